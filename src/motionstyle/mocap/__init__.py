@@ -1,0 +1,1 @@
+"""From clip files to kinematic motions: readers, dataset doors, retargeting, contacts."""
