@@ -1,0 +1,189 @@
+"""Which source joint each node of the body follows: `config/skeletons/{name}.yaml`.
+
+A map names, for every node the source shows, the source joint at the node's joint centre
+(`joints`), the source joint whose rotation the node follows where that is another one
+(`frames`), and the tips of head, hands and feet (`ends`). Nodes that are not named are not
+observed. Every joint of the source must be mapped or listed under `ignored` (shell patterns),
+so that no clip is read through the wrong map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from motionstyle.body.layout import NODES
+from motionstyle.errors import MotionStyleError, near_matches
+from motionstyle.mocap.clip import SkeletonClip, forward_kinematics
+
+END_NAMES = ("head_top", "fingertip_r", "fingertip_l", "wrist_r", "wrist_l") + tuple(
+    f"{point}_{side}" for side in "rl" for point in ("toe", "foot_front")
+)
+REQUIRED_NODES = ("pelvis", "abdomen", "head") + tuple(
+    f"{node}_{side}" for side in "rl" for node in ("thigh", "shank", "foot", "upper_arm", "forearm")
+)
+_KEYS = {"joints", "frames", "ends", "ignored", "zero_pose", "axes", "offsets_like", "note"}
+_DIRECTIONS = {
+    sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[i]
+    for sign in "+-"
+    for i, letter in enumerate("xyz")
+}
+
+
+@dataclass(frozen=True)
+class SkeletonMap:
+    """A source skeleton's joints by node; see the module's text.
+
+    zero_pose is "standing" (bones of the zero pose point where they do in a person standing
+    with arms hanging or raised sideways) or "axes" (the zero pose means nothing and `axes` says
+    which local axis of each source joint points forward, up and right). `offsets_like` gives
+    joints whose offset the file has lost the offset of another joint.
+    """
+
+    name: str
+    joints: Mapping[str, str]
+    frames: Mapping[str, str] = field(default_factory=dict)
+    ends: Mapping[str, str] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+    zero_pose: str = "standing"
+    axes: Mapping[str, np.ndarray] = field(default_factory=dict)
+    offsets_like: Mapping[str, str] = field(default_factory=dict)
+
+    def observes(self, node: str) -> bool:
+        """Whether the source shows this node."""
+        return node in self.joints
+
+    def frame_joint(self, node: str) -> str:
+        """Return the source joint whose rotation the node follows."""
+        return self.frames.get(node, self.joints[node])
+
+
+def _axes(path: Path, node: str, text: str) -> np.ndarray:
+    words = str(text).split()
+    if len(words) != 3 or any(w not in _DIRECTIONS for w in words):
+        raise MotionStyleError(
+            f"{path}: axes of {node} are '{text}'; write the source joint's local axes that point "
+            "forward, up and right, such as '+z +x +y'"
+        )
+    matrix = np.column_stack([_DIRECTIONS[w] for w in words])
+    if not np.isclose(np.linalg.det(matrix), 1.0):
+        raise MotionStyleError(f"{path}: axes of {node} ('{text}') are not a right-handed frame")
+    return matrix
+
+
+def read_skeleton_map(folder: str | Path, name: str) -> SkeletonMap:
+    """Read and check one skeleton map.
+
+    Raises
+    ------
+    MotionStyleError
+        If there is no such map, or a key, node or end name in it is unknown.
+    """
+    path = Path(folder) / f"{name}.yaml"
+    known = sorted(p.stem for p in Path(folder).glob("*.yaml"))
+    if not path.is_file():
+        raise MotionStyleError(
+            f"skeleton '{name}' has no file {path}{near_matches(name, known)}; "
+            f"known skeletons: {', '.join(known)}"
+        )
+    data = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    problems = [f"unknown key '{k}'{near_matches(k, sorted(_KEYS))}" for k in set(data) - _KEYS]
+    joints = data.get("joints") or {}
+    for section, names in (("joints", NODES), ("frames", NODES), ("axes", NODES)):
+        for node in data.get(section) or {}:
+            if node not in names:
+                problems.append(f"{section}: unknown node '{node}'{near_matches(node, names)}")
+    for end in data.get("ends") or {}:
+        if end not in END_NAMES:
+            problems.append(f"ends: unknown end '{end}'{near_matches(end, END_NAMES)}")
+    problems += [f"joints: node '{n}' is missing" for n in REQUIRED_NODES if n not in joints]
+    zero_pose = data.get("zero_pose", "standing")
+    if zero_pose not in {"standing", "axes"}:
+        problems.append(f"zero_pose is '{zero_pose}', must be standing or axes")
+    if zero_pose == "axes":
+        missing = [n for n in joints if n not in (data.get("axes") or {})]
+        problems += [f"axes: node '{n}' is missing" for n in missing]
+    if problems:
+        raise MotionStyleError(f"{path}: " + "; ".join(sorted(problems)))
+    return SkeletonMap(
+        name=name,
+        joints=joints,
+        frames=data.get("frames") or {},
+        ends=data.get("ends") or {},
+        ignored=tuple(data.get("ignored") or ()),
+        zero_pose=zero_pose,
+        axes={n: _axes(path, n, t) for n, t in (data.get("axes") or {}).items()},
+        offsets_like=data.get("offsets_like") or {},
+    )
+
+
+def check_joints(clip: SkeletonClip, skeleton: SkeletonMap) -> None:
+    """Refuse a clip whose joints are not the ones of the map, naming all that differ.
+
+    Raises
+    ------
+    MotionStyleError
+        With every joint the map needs and the clip lacks, and every joint of the clip the map
+        does not know, each with its near matches.
+    """
+    wanted = (
+        set(skeleton.joints.values())
+        | set(skeleton.frames.values())
+        | set(skeleton.ends.values())
+        | set(skeleton.offsets_like)
+    )
+    missing = sorted(wanted - set(clip.joints))
+    unknown = [
+        joint
+        for joint in clip.joints
+        if joint not in wanted and not any(fnmatchcase(joint, p) for p in skeleton.ignored)
+    ]
+    problems = [f"lacks joint '{j}'{near_matches(j, clip.joints)}" for j in missing]
+    problems += [
+        f"has joint '{j}' that the map does not name{near_matches(j, sorted(wanted))}"
+        for j in unknown
+    ]
+    if problems:
+        raise MotionStyleError(
+            f"{clip.source}: not the skeleton '{skeleton.name}': "
+            + "; ".join(problems)
+            + ". Choose another skeleton in the sheet, or add the joint to "
+            f"config/skeletons/{skeleton.name}.yaml (under `ignored` if it is of no use)"
+        )
+
+
+def restore_offsets(clip: SkeletonClip, like: Mapping[str, str]) -> SkeletonClip:
+    """Give joints whose offset the file has lost the offset of another joint (a known defect).
+
+    Positions of the joints and of all that hangs on them are recomputed; rotations stay.
+    """
+    if not like:
+        return clip
+    index = {name: i for i, name in enumerate(clip.joints)}
+    local_rotations = np.array(clip.rotations)
+    local_positions = np.array(clip.positions)
+    for joint, parent in enumerate(clip.parents):
+        if parent >= 0:
+            turned = np.swapaxes(clip.rotations[:, parent], 1, 2)
+            local_rotations[:, joint] = turned @ clip.rotations[:, joint]
+            arm = clip.positions[:, joint] - clip.positions[:, parent]
+            local_positions[:, joint] = np.einsum("fab,fb->fa", turned, arm)
+    offsets = np.array(clip.rest_offsets)
+    for joint, model in like.items():
+        offsets[index[joint]] += clip.rest_offsets[index[model]]
+        local_positions[:, index[joint]] += clip.rest_offsets[index[model]]
+    positions, rotations = forward_kinematics(clip.parents, local_positions, local_rotations)
+    return SkeletonClip(
+        clip.joints, clip.parents, offsets, positions, rotations, clip.rate_hz, clip.source
+    )
+
+
+def joint_indices(clip: SkeletonClip, names: Sequence[str]) -> list[int]:
+    """Return the positions of joint names in the clip."""
+    index = {name: i for i, name in enumerate(clip.joints)}
+    return [index[name] for name in names]

@@ -1,0 +1,1 @@
+"""`Motion`, the one value that travels between the stages, and its files."""
