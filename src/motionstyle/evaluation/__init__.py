@@ -1,0 +1,1 @@
+"""Metrics on motions, comparisons with ground truth, and the ledger of claims."""
