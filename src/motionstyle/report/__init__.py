@@ -1,0 +1,1 @@
+"""The page that shows a run: clips, figures and the ledger, in one file that works offline."""
