@@ -81,7 +81,7 @@ def read_deepmimic(
     if not (np.isfinite(rate) and rate > 0):
         raise MotionStyleError(f"{path}: rate_hz is {rate_hz}, expected frames per second above 0")
     durations = rows[:-1, 0]
-    durations = np.where(np.abs(durations * nominal - 1.0) < 1e-3, 1.0 / nominal, durations)
+    durations = np.where(np.abs(durations * nominal - 1.0) < 2e-3, 1.0 / nominal, durations)
     root, turns = rows[:, 1:4], _local_rotations(rows)
     if cycles > 1:
         _check_seam(path, loop, turns[:, 0])

@@ -84,24 +84,26 @@ def find_frozen(clip: SkeletonClip) -> list[tuple[int, int]]:
 def repair_flips(clip: SkeletonClip, flips: Sequence[tuple[int, int]]) -> SkeletonClip:
     """Return the clip with flipped joints turned halfway between the frames around them.
 
-    The joint's rotation against its parent is interpolated along the shortest arc; joints
-    below it keep theirs and move along. Adjacent flips of one joint cannot occur.
+    Rotations against the parent are interpolated along the shortest arc, of the joint and of
+    all below it: some of these undo the flip in the file, others follow it. Two flips of one
+    joint are never adjacent, as the frames around each agree.
     """
-    rotations = clip.rotations.copy()
-    parents = clip.parents
-    local = np.where(
-        (parents >= 0)[None, :, None, None],
-        np.swapaxes(rotations[:, parents], -1, -2) @ rotations,
-        rotations,
-    )
+    parents, child = clip.parents, clip.parents >= 0
+    above = clip.rotations[:, parents]
+    above[:, ~child] = np.eye(3)
+    local = np.swapaxes(above, -1, -2) @ clip.rotations
     offsets = clip.positions.copy()
-    child = parents >= 0
-    apart = clip.positions[:, child] - clip.positions[:, parents[child]]
-    offsets[:, child] = np.einsum("fjba,fjb->fja", rotations[:, parents[child]], apart)
+    offsets[:, child] -= clip.positions[:, parents[child]]
+    offsets = np.einsum("fjba,fjb->fja", above, offsets)
     for frame, joint in flips:
-        around = Rotation.from_matrix(local[[frame - 1, frame + 1], joint])
-        local[frame, joint] = Slerp([0.0, 1.0], around)(0.5).as_matrix()
-    positions, rotations = forward_kinematics(parents, offsets, local)
+        for at in _branch(clip, joint):
+            around = Rotation.from_matrix(local[[frame - 1, frame + 1], at])
+            local[frame, at] = Slerp([0.0, 1.0], around)(0.5).as_matrix()
+    positions, rotations = clip.positions.copy(), clip.rotations.copy()
+    touched = sorted({frame for frame, _ in flips})
+    positions[touched], rotations[touched] = forward_kinematics(
+        parents, offsets[touched], local[touched]
+    )
     return replace(clip, positions=positions, rotations=rotations)
 
 

@@ -77,7 +77,7 @@ def read_lines(path: Path, kind: str) -> list[str]:
     if zero >= 0:
         hint = " (UTF-16? save it as UTF-8)" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ""
         raise MotionStyleError(
-            f"{path}: not a {kind} text file: byte {zero} is 0, as in binary data{hint}"
+            f"{path}: not {kind} text: byte {zero} is 0, as in binary data{hint}"
         )
     try:
         text = data.decode("utf-8-sig")
