@@ -13,7 +13,10 @@ from motionstyle.errors import MotionStyleError
 
 ROOT = Path(__file__).parents[1]
 SCHEMA = ROOT / "workflow" / "schemas" / "config.schema.json"
-NAMES = ("motions.tsv", "datasets.tsv", "embedded.yaml", "claims.yaml")
+NAMES = (
+    *("motions.tsv", "datasets.tsv", "embedded.yaml", "claims.yaml"),
+    *("planted.tsv", "normative_gait.yaml"),
+)
 
 
 @pytest.fixture
@@ -25,7 +28,13 @@ def root(tmp_path):
     return tmp_path
 
 
-RAW = {"name": "test", "results_root": "results", "motions": "config/motions.tsv"}
+SHIPPED = yaml.safe_load((ROOT / "config" / "config.yaml").read_text(encoding="utf-8"))
+RAW = {
+    "name": "test",
+    "results_root": "results",
+    "motions": "config/motions.tsv",
+    **{group: SHIPPED[group] for group in ("retarget", "contacts", "figures")},
+}
 
 
 def problems(raw: object, root: Path, schema: Path = SCHEMA) -> list[str]:
@@ -127,7 +136,8 @@ def test_null_is_refused_and_told_once(root):
 
 
 def test_null_in_a_group_of_free_keys_is_refused(root):
-    assert changed(root, retarget={"x": {"y": None}}).startswith("config key 'retarget.x.y': found")
+    gates = {**RAW["contacts"], "limp": {"gap_s": None}}
+    assert changed(root, contacts=gates).startswith("config key 'contacts.limp.gap_s': found null")
 
 
 def test_empty_list_where_an_entry_is_needed(root, tmp_path):
@@ -183,3 +193,20 @@ def test_all_problems_at_once_in_order(root):
     raw = {**RAW, "name": 3, "mirrors": "a", "contacts": [], "figures": None, "moitons": "x"}
     keys = [line.split("'")[1] for line in problems(raw, root)]
     assert keys == ["contacts", "figures", "mirrors", "moitons", "name"]
+
+
+def test_misspelt_contact_threshold(root):
+    gates = {**RAW["contacts"], "run": {"enter_hight_m": 0.04}}
+    found = changed(root, contacts=gates)
+    assert "contacts.run.enter_hight_m" in found
+    assert "did you mean enter_height_m" in found
+
+
+def test_contacts_need_a_default(root):
+    found = changed(root, contacts={"run": RAW["contacts"]["run"]})
+    assert found.startswith("config key 'contacts.default': found nothing")
+
+
+def test_cutoff_must_be_a_frequency(root):
+    found = changed(root, retarget={**RAW["retarget"], "cutoff_hz": {"default": 0}})
+    assert found.startswith("config key 'retarget.cutoff_hz.default': found 0, expected")

@@ -184,8 +184,18 @@ def test_quaternions_are_normalised_within_the_tolerance(tmp_path):
         read(tmp_path, document(rows), norm_tolerance=1e-3)
 
 
+def closed(knee=0.0, height=0.8):
+    """Five frames whose last equals the first but for a step, a knee angle and a height."""
+    rows = [row() for _ in range(5)]
+    for at, one in enumerate(rows):
+        one[1:4] = [0.1 * at, 0.8, 0.05 * at]
+    rows[-1][2], rows[-1][20] = height, knee
+    rows[-1][0] = 0.0
+    return document(rows)
+
+
 def test_cycles_shift_in_the_plane_and_share_the_boundary_frame(tmp_path):
-    one, three = read(tmp_path), read(tmp_path, cycles=3)
+    one, three = read(tmp_path, closed()), read(tmp_path, closed(), cycles=3)
     assert (one.frames, three.frames) == (5, 13)
     step = np.array([0.4, 0.0, 0.2])
     for cycle in range(3):
@@ -194,6 +204,22 @@ def test_cycles_shift_in_the_plane_and_share_the_boundary_frame(tmp_path):
             three.positions[part], one.positions[:4] + cycle * step, atol=1e-12
         )
     np.testing.assert_allclose(three.positions[-1], one.positions[-1] + 2 * step, atol=1e-12)
+
+
+def test_repeats_of_a_cycle_that_does_not_close_meet_halfway(tmp_path):
+    one = read(tmp_path, closed(knee=-0.4, height=0.9))
+    three = read(tmp_path, closed(knee=-0.4, height=0.9), cycles=3)
+    knee, shank = (one.joints.index(n) for n in ("right_hip", "right_knee"))
+
+    def bend(clip, frame):
+        local = clip.rotations[frame, knee].T @ clip.rotations[frame, shank]
+        return Rotation.from_matrix(local).as_rotvec()[2]
+
+    assert bend(one, 4) == pytest.approx(-0.4)
+    for seam in (0, 4, 8, 12):
+        assert bend(three, seam) == pytest.approx(-0.2)
+        assert three.positions[seam, 0, 1] == pytest.approx(0.85)
+    assert bend(three, 2) == pytest.approx(bend(one, 2))
 
 
 def cut(**changes):

@@ -85,6 +85,7 @@ def read_deepmimic(
     root, turns = rows[:, 1:4], _local_rotations(rows)
     if cycles > 1:
         _check_seam(path, loop, turns[:, 0])
+        root, turns = _close_seam(root, turns)
         root, turns, durations = _unroll(root, turns, durations, cycles)
     times = np.concatenate([[0.0], np.cumsum(durations)])
     root, turns = _resample(times, root, turns, rate)
@@ -202,6 +203,28 @@ def _check_seam(path: Path, loop: str, root: NDArray[np.float64]) -> None:
             f"{path}: the root turns by {np.degrees(turn):.0f} degrees from the first to the last "
             "frame; repeats are displaced but not turned, so this clip has 1 cycle"
         )
+
+
+def _close_seam(
+    root: NDArray[np.float64], quaternions: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Let the last frame meet the first, so that repeats do not jump where they join.
+
+    The published cycles do not quite close (28° at the walk's shoulder). Half of each joint's
+    turn between last and first frame is spread over the last quarter of the cycle, the other
+    half, backwards, over the first quarter, with smooth weights; the root's height likewise.
+    """
+    phase = np.linspace(0.0, 1.0, len(root))
+    fade = np.clip(4.0 * np.abs(phase - 0.5) - 1.0, 0.0, 1.0)
+    weight = 0.5 * np.sign(phase - 0.5) * fade**2 * (3.0 - 2.0 * fade)
+    closed = np.array(quaternions)
+    for joint in range(quaternions.shape[1]):
+        turns = Rotation.from_quat(quaternions[:, joint])
+        gap = (turns[0] * turns[-1].inv()).as_rotvec()
+        closed[:, joint] = (Rotation.from_rotvec(weight[:, None] * gap) * turns).as_quat()
+    raised = np.array(root)
+    raised[:, 1] += weight * (root[0, 1] - root[-1, 1])
+    return raised, closed
 
 
 def _unroll(

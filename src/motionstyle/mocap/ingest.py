@@ -146,7 +146,7 @@ def ingest_clip(
         contact_normals=np.broadcast_to(UP, (*contacts.shape, 3)).copy(),
         observed=observed,
         rebranched=rebranched,
-        provenance=_provenance(row, clip),
+        provenance={**provenance(row), "source_frames": _source_frames(row, clip)},
     )
     report = {
         "marker_rms_cm": 100 * float(np.sqrt((distances**2).mean())),
@@ -238,8 +238,8 @@ def _front_of_foot(frames: NodeFrames, side: str) -> Array:
     return frames.ends[f"foot_front_{side}"] if front is None else front
 
 
-def _provenance(row: ClipRow, clip: SkeletonClip) -> dict[str, Any]:
-    first = row.first_frame or 0
+def provenance(row: ClipRow) -> dict[str, Any]:
+    """Return what the sheet says about a clip, for the motion's sidecar."""
     return {
         "dataset": row.dataset or "own",
         "source": row.path,
@@ -248,7 +248,12 @@ def _provenance(row: ClipRow, clip: SkeletonClip) -> dict[str, Any]:
         "style": row.style or "",
         "surface": row.surface,
         "experiments": list(row.experiments),
-        "source_frames": f"{first}-{first + clip.frames - 1}",
         "level": "kinematic",
         "planted": False,
     }
+
+
+def _source_frames(row: ClipRow, clip: SkeletonClip) -> str:
+    """Return the frames of the file that the motion shows, such as "1-277"."""
+    first = row.first_frame or 0
+    return f"{first}-{first + clip.frames - 1}"

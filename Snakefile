@@ -1,0 +1,21 @@
+"""Motion style: three papers replicated from motion capture to figures, tables and a ledger."""
+
+from snakemake.utils import min_version
+
+min_version("9.27")
+
+
+configfile: workflow.source_path("config/config.yaml")
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/mocap.smk"
+include: "workflow/rules/evaluation.smk"
+include: "workflow/rules/report.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        RESULTS / "status/clips.ok",
+        RESULTS / "report.html",

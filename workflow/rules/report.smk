@@ -1,0 +1,138 @@
+# Figures, the page, what is published, and whether all clips could be read.
+
+
+rule figure_body:
+    input:
+        motion=MOTIONS / "captured" / f"{SHOWN['body'][0]}.npz",
+        library=library("body", "motion", "figures"),
+    output:
+        svg=RESULTS / "figures/body.svg",
+        png=RESULTS / "figures/body.png",
+    log:
+        LOGS / "figures/body.log",
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/figure_body.py"
+
+
+rule figure_strips:
+    input:
+        motions=[MOTIONS / f"captured/{id}.npz" for id in SHOWN["strips"]],
+        library=library("body", "motion", "evaluation", "figures"),
+    output:
+        svg=RESULTS / "figures/strips.svg",
+        png=RESULTS / "figures/strips.png",
+    log:
+        LOGS / "figures/strips.log",
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/figure_strips.py"
+
+
+use rule figure_strips as figure_planted with:
+    input:
+        motions=[MOTIONS / f"planted/{id}.npz" for id in list(PLANTED)[:: max(1, len(PLANTED) // 6)]],
+        library=library("body", "motion", "evaluation", "figures"),
+    output:
+        svg=RESULTS / "figures/planted.svg",
+        png=RESULTS / "figures/planted.png",
+    log:
+        LOGS / "figures/planted.log",
+
+
+rule figure_gait:
+    input:
+        motions=[MOTIONS / f"captured/{id}.npz" for id in SHOWN["gait"]],
+        normative=CONFIG["normative"],
+        library=library("body", "motion", "evaluation", "figures"),
+    output:
+        svg=RESULTS / "figures/gait.svg",
+        png=RESULTS / "figures/gait.png",
+    log:
+        LOGS / "figures/gait.log",
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/figure_gait.py"
+
+
+rule figure_markers:
+    input:
+        quality=[RESULTS / f"quality/{id}.json" for id in SHOWN["markers"]],
+        library=library("figures"),
+    output:
+        svg=RESULTS / "figures/markers.svg",
+        png=RESULTS / "figures/markers.png",
+    log:
+        LOGS / "figures/markers.log",
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/figure_markers.py"
+
+
+rule report:
+    input:
+        clips=RESULTS / "tables/clips.csv",
+        motions=RESULTS / "tables/motions.csv",
+        claims_table=RESULTS / "tables/claims.csv",
+        tables=TABLES,
+        claims=CONFIG["claims"],
+        schema=ROOT / "workflow/schemas/claims.schema.json",
+        captions=ROOT / "workflow/report/captions.yaml",
+        figures=[RESULTS / f"figures/{name}.png" for name in FIGURES],
+        library=library("evaluation", "report"),
+    output:
+        page=RESULTS / "report.html",
+    params:
+        results=str(RESULTS),
+        config=CONFIG["name"],
+    log:
+        LOGS / "report.log",
+    threads: 1
+    resources:
+        mem_mb=1000,
+    script:
+        "../scripts/report.py"
+
+
+rule check_clips:
+    input:
+        clips=RESULTS / "tables/clips.csv",
+        report=RESULTS / "report.html",
+    output:
+        stamp=RESULTS / "status/clips.ok",
+    params:
+        allow=CONFIG["allow_failed_clips"],
+    log:
+        LOGS / "check_clips.log",
+    threads: 1
+    resources:
+        mem_mb=200,
+    script:
+        "../scripts/check_clips.py"
+
+
+rule publish:
+    input:
+        tables=[RESULTS / f"tables/{name}.csv" for name in ("clips", "gait_bands", "gait", "claims")],
+        figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],
+        stamp=RESULTS / "status/clips.ok",
+        datasets=CONFIG["datasets"],
+    params:
+        config=CONFIG["name"],
+        folder=str(ROOT / "results/published"),
+        used=sorted({(row.dataset or "own", row.path) for row in CLIPS.values()}),
+    log:
+        LOGS / "publish.log",
+    threads: 1
+    resources:
+        mem_mb=200,
+    script:
+        "../scripts/publish.py"

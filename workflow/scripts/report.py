@@ -1,0 +1,21 @@
+"""Write the report page of this run."""
+
+from pathlib import Path
+
+import yaml
+
+from motionstyle.evaluation.claims import evaluate_claims, load_claims
+from motionstyle.jobs import job
+from motionstyle.report.page import write_report
+
+with job(snakemake.log[0]):
+    captions = yaml.safe_load(Path(snakemake.input.captions).read_text(encoding="utf-8"))
+    claims = load_claims(snakemake.input.claims, snakemake.input.schema)
+    write_report(
+        snakemake.output.page,
+        evaluate_claims(claims, snakemake.params.results),
+        results_root=snakemake.params.results,
+        config_name=snakemake.params.config,
+        data_kind=captions["data"].get(snakemake.params.config, captions["data"]["own"]),
+        figures=[(f, captions["figures"][Path(f).stem]) for f in snakemake.input.figures],
+    )
