@@ -1,0 +1,1 @@
+"""Figures: one style, one way to write them; numbers come from `evaluation`."""

@@ -1,0 +1,228 @@
+"""Stick figures over time with contacts and streamers (after Brand & Hertzmann's figures)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from motionstyle.body.layout import CONTACT_POINTS
+from motionstyle.errors import MotionStyleError
+from motionstyle.figures.skeleton import BONES, STREAMER_POINTS, View, named_points, project
+from motionstyle.figures.style import (
+    GROUND,
+    PRINT_WIDTH_IN,
+    SIDE_COLOURS,
+    SIDE_LINES,
+    SMALL_PT,
+    motion_title,
+    new_figure,
+    styled,
+)
+from motionstyle.motion.motion import Motion
+
+Array = NDArray[np.float64]
+# Between stick figures on paper, as a share of one figure's usual width from foot to foot and
+# hand to hand, and at least this much (m); not a whole step, or all would show the same phase.
+SPACING_SHARE, SPACING_M = 0.55, 0.45
+IN_TIME_SPACING_M = 0.6
+LONGEST_M = 6.6  # of travel drawn; what comes later is left out and the title says so
+HARDLY_TRAVELS_M = 1.5  # below this the figures are pushed apart with time
+
+
+@dataclass(frozen=True)
+class Strip:
+    """What a strip draws: frames of the stick figures, and the extra shift in m per frame."""
+
+    frames: tuple[int, ...]
+    last_frame: int
+    shift: Array
+    offset_in_time: bool
+
+
+def plan_strip(motion: Motion, across: Array, width: float, count: int | None) -> Strip:
+    """Choose the frames to draw, given the pelvis' place across the paper (F,), m.
+
+    width : usual extent of one figure across the paper, m. count : number of figures; None for
+    as many as can be told apart, 2 to 16.
+    """
+    forward = across - across[0]
+    in_time = float(np.ptp(forward)) < HARDLY_TRAVELS_M
+    beyond = np.flatnonzero(np.abs(forward) > LONGEST_M)
+    last = int(beyond[0]) - 1 if len(beyond) and not in_time else motion.frames - 1
+    if count is None:
+        room = LONGEST_M - float(np.ptp(forward)) if in_time else float(np.ptp(forward[: last + 1]))
+        spacing = IN_TIME_SPACING_M if in_time else max(SPACING_M, SPACING_SHARE * width)
+        count = int(np.clip(room / spacing, 1, 15)) + 1
+    if count < 1 or last < 1:
+        raise MotionStyleError(
+            f"motion {motion.id}: cannot draw {count} stick figures of {last + 1} frames"
+        )
+    frames = np.unique(np.round(np.linspace(0, last, count)).astype(int))
+    shift = np.zeros(motion.frames)
+    if in_time:
+        per_figure = (LONGEST_M - float(np.ptp(forward))) / max(1, count - 1)
+        shift = np.arange(motion.frames) * min(per_figure, 0.8) * max(1, count - 1) / last
+    return Strip(tuple(int(f) for f in frames), last, shift, in_time)
+
+
+@styled
+def stick_strip(
+    axes: Axes,
+    motion: Motion,
+    n: int | None = None,
+    *,
+    view: View = "side",
+    title: str | None = None,
+) -> Strip:
+    """Draw stick figures over time with the floor, contacts (dots) and streamers.
+
+    Parameters
+    ----------
+    n : number of stick figures; None lets the length of the way decide.
+    view : see `skeleton.project`; the grey line is the level floor y = 0, or, in the oblique view,
+        the pelvis' path on it.
+    title : by default the motion's id; planted motions are marked.
+
+    Figures stand where the motion was, or, if it travels less than 1.5 m, are pushed to the
+    right in proportion to time. The time of each stands below it.
+    """
+    points = named_points(motion.body, motion.coordinates)
+    points["ground"] = points["pelvis"] * [1, 0, 1]
+    flat = project(motion, points, view)
+    places = np.stack([path[:, 0] for name, path in flat.items()])
+    width = float(np.median(np.ptp(places, axis=0)))
+    strip = plan_strip(motion, flat["pelvis"][:, 0], width, n)
+    flat = {name: path + np.outer(strip.shift, [1.0, 0.0]) for name, path in flat.items()}
+    shown = slice(0, strip.last_frame + 1)
+    for name in STREAMER_POINTS:
+        axes.plot(*flat[name][shown].T, color=SIDE_COLOURS[name[-1]], linewidth=0.5, alpha=0.55)
+    for bone in BONES:
+        lines = [np.array([flat[name][f] for name in bone.points]) for f in strip.frames]
+        axes.add_collection(
+            LineCollection(
+                lines,
+                colors=SIDE_COLOURS[bone.side],
+                linestyles=[SIDE_LINES[bone.side]],
+                linewidths=1.1,
+                capstyle="butt",
+                label=f"bones {bone.side or 'trunk'}",
+            )
+        )
+    size = float(np.linalg.norm(motion.body.geometry.end_points[0]))
+    heads = [_head(flat["head"][f], flat["head_top"][f], size) for f in strip.frames]
+    axes.add_collection(LineCollection(heads, colors=SIDE_COLOURS[""], linewidths=1.1))
+    for f in strip.frames:
+        touching = [n for n, on in zip(CONTACT_POINTS, motion.contacts[f], strict=True) if on]
+        for side in "lr":
+            spots = [flat[name][f] for name in touching if name.endswith(f"_{side}")]
+            if spots:
+                axes.plot(*np.array(spots).T, "o", color=SIDE_COLOURS[side], markersize=2.6)
+    _label(axes, motion, strip, flat, view=view, title=title)
+    return strip
+
+
+def _head(neck: Array, top: Array, length: float) -> Array:
+    """Return a circle (25, 2) around the upper part of a head of some length (m)."""
+    angle = np.linspace(0, 2 * np.pi, 25)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    return neck + 0.62 * (top - neck) + 0.38 * length * circle
+
+
+def _label(
+    axes: Axes,
+    motion: Motion,
+    strip: Strip,
+    flat: dict[str, Array],
+    *,
+    view: View,
+    title: str | None,
+) -> None:
+    """Write times, axis labels and title, and set the limits so that all of it is inside."""
+    drawn = np.concatenate([path[: strip.last_frame + 1] for path in flat.values()])
+    (left, low), (right, high) = drawn.min(axis=0), drawn.max(axis=0)
+    low = min(low, 0.0)
+    if view == "oblique":
+        axes.plot(*flat["ground"][: strip.last_frame + 1].T, color=GROUND, linewidth=0.6, zorder=0)
+    else:
+        axes.plot([left - 0.15, right + 0.15], [0.0, 0.0], color=GROUND, linewidth=0.6, zorder=0)
+    for f in strip.frames:
+        axes.text(
+            flat["pelvis"][f, 0],
+            low - 0.05,
+            f"{f / motion.rate_hz:.2f}",
+            ha="center",
+            va="top",
+            fontsize=SMALL_PT,
+        )
+    axes.set_xlim(left - 0.15, right + 0.15)
+    axes.set_xticks(np.arange(np.ceil(left), right + 0.15))
+    axes.spines["bottom"].set_bounds(left - 0.15, right + 0.15)
+    axes.set_ylim(low - 0.28, high + 0.08)
+    axes.set_aspect("equal")
+    axes.set_yticks([0.0, 0.5, 1.0, 1.5] if view != "oblique" else [])
+    axes.set_ylabel("height, m" if view != "oblique" else "")
+    if strip.offset_in_time:
+        pace = strip.shift[-1] * motion.rate_hz / (motion.frames - 1)
+        axes.set_xticks([])
+        text = f"forward position, moved right by {pace:.1f} m per second"
+    else:
+        seen = ", seen obliquely" if view == "oblique" else ""
+        text = f"distance along the direction of travel{seen}, m"
+    axes.set_xlabel(f"{text} (below each figure: time, s)", loc="left")
+    text = motion_title(motion, title)
+    if strip.last_frame < motion.frames - 1:
+        text += f": first {strip.last_frame / motion.rate_hz:.1f} s of {motion.times[-1]:.1f} s"
+    axes.set_title(text, loc="left")
+
+
+@styled
+def strip_figure(
+    motions: Sequence[Motion],
+    titles: Sequence[str] | None = None,
+    *,
+    view: View = "side",
+    n: int | None = None,
+) -> Figure:
+    """Return a figure with one strip per motion, one above the other on the same scale.
+
+    Raises
+    ------
+    MotionStyleError
+        If there is no motion, or not one title for each.
+    """
+    names = [m.id for m in motions] if titles is None else list(titles)
+    if not motions or len(names) != len(motions):
+        raise MotionStyleError(f"a strip figure of {len(motions)} motions got {len(names)} titles")
+    figure = new_figure(1.0)
+    grid = figure.subplots(len(motions), 1, squeeze=False)[:, 0]
+    extents = []
+    for axes, motion, name in zip(grid, motions, names, strict=True):
+        stick_strip(axes, motion, n, view=view, title=name)
+        extents.append((np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+    widest = max(width for width, _height in extents)
+    scale = (PRINT_WIDTH_IN - 0.7) / widest  # inches of paper per metre
+    for axes, (width, _height) in zip(grid, extents, strict=True):
+        left, right = axes.get_xlim()
+        axes.set_xlim(left, right + widest - width)
+    heights = [height * scale + 0.65 for _width, height in extents]
+    figure.set_size_inches(PRINT_WIDTH_IN, sum(heights) + 0.35)
+    grid[0].get_subplotspec().get_gridspec().set_height_ratios(heights)
+    handles = [
+        Line2D([], [], color=SIDE_COLOURS[side], linestyle=SIDE_LINES[side], label=label)
+        for side, label in (("r", "right"), ("l", "left"), ("", "trunk and head"))
+    ]
+    handles.append(
+        Line2D([], [], color=GROUND, marker="o", linestyle="", markersize=3, label="contact point")
+    )
+    handles.append(
+        Line2D([], [], color=GROUND, linewidth=0.5, label="path of hand or ball of the foot")
+    )
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, handlelength=2.4)
+    return figure
