@@ -169,9 +169,11 @@ def build_body(
             rear_com = (row.com - toes_share * TOES_COM_FRACTION) / REARFOOT_MASS_FRACTION
             com = split_com if node.startswith("toes") else rear_com
             mass *= share
-            # the foot's long axis is horizontal
-            long_part = np.array([row.longitudinal, row.transverse, row.sagittal]) * length
-            gyration = long_part * np.array([1.0, length_share, length_share])
+            # the foot's long axis is horizontal; its parts keep its cross-section
+            squared = (np.array([row.longitudinal, row.transverse, row.sagittal]) * length) ** 2
+            spread = squared.sum() / 2 - squared  # mean squares of x, y and z
+            spread[0] *= length_share**2
+            gyration = np.sqrt(spread.sum() - spread)
             length *= length_share
         direction = along / np.linalg.norm(along)
         if inertia == "ellipsoid":

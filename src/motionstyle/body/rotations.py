@@ -95,7 +95,8 @@ def shortest_arc(source: Array, target: Array) -> Array:
         helper = np.eye(3)[np.argmin(np.abs(a))]
         axis = np.cross(a, helper)
         return exponential(np.pi * axis / np.linalg.norm(axis))
-    return exponential(axis / size * np.arctan2(size, a @ b))
+    upright = axis - (axis @ a) * a  # rounding tilts it where the directions are almost opposite
+    return exponential(upright / np.linalg.norm(upright) * np.arctan2(size, a @ b))
 
 
 def slerp(matrices: Array, times: Array, new_times: Array) -> Array:

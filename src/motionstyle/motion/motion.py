@@ -70,7 +70,9 @@ class Motion:
                 )
         if self.kind not in KINDS:
             raise MotionStyleError(f"motion {self.id}: kind '{self.kind}' is not one of {KINDS}")
-        if not self.rate_hz > 0:
+        if frames == 0:
+            raise MotionStyleError(f"motion {self.id}: no frames")
+        if not 0 < self.rate_hz < np.inf:
             raise MotionStyleError(f"motion {self.id}: rate is {self.rate_hz} Hz, must be positive")
         bad = np.argwhere(~np.isfinite(self.coordinates))
         if len(bad):

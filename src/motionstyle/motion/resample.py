@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 from motionstyle.body.layout import EXPONENTIAL_BLOCKS
-from motionstyle.body.rotations import exponential, logarithm, slerp, unroll
+from motionstyle.body.rotations import logarithm, slerp, unroll
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
 
@@ -26,24 +27,39 @@ def lowpass(values: Array, rate_hz: float, cutoff_hz: float, order: int = 2) -> 
     if cutoff_hz >= 0.45 * rate_hz or len(values) < 10:
         return np.array(values)
     sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
-    padding = min(len(values) - 1, int(round(rate_hz / cutoff_hz * 3)))
+    padding = min(len(values) - 1, round(rate_hz / cutoff_hz * 3))
     return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=padding)
+
+
+def _rebranched_blocks(motion: Motion) -> list[slice]:
+    """Return the exponential maps that jump at one of the motion's re-branched frames."""
+    after = np.array(motion.rebranched, dtype=int)
+    steps = motion.coordinates[after] - motion.coordinates[after - 1]
+    return [b for b in EXPONENTIAL_BLOCKS if (np.linalg.norm(steps[:, b], axis=1) > np.pi).any()]
+
+
+def _quaternions(vectors: Array) -> Array:
+    """Return unit quaternions (F, 4) of rotation vectors (F, 3), continuous in time."""
+    quaternions = Rotation.from_rotvec(vectors).as_quat()
+    flips = np.einsum("fa,fa->f", quaternions[1:], quaternions[:-1]) < 0
+    quaternions[1:] *= np.cumprod(np.where(flips, -1.0, 1.0))[:, None]
+    return quaternions
 
 
 def resample(motion: Motion, rate_hz: float) -> Motion:
     """Return the motion at another rate (Hz) on the same time span.
 
-    Angles and positions go through cubic splines; exponential maps too where they are
-    continuous, and along great arcs where the motion was re-branched. Going down in rate the
-    signal is low-passed first at 0.4 of the new rate. Contacts are taken from the nearest frame,
-    contact forces are interpolated linearly.
+    Angles and positions go through cubic splines, and so do exponential maps that are continuous;
+    one that was re-branched is interpolated along great arcs. Going down in rate the signal is
+    low-passed first at 0.4 of the new rate. Contacts are taken from the nearest frame, contact
+    forces are interpolated linearly.
 
     Raises
     ------
     MotionStyleError
         If the rate is not positive or the motion has fewer than four frames.
     """
-    if not rate_hz > 0:
+    if not 0 < rate_hz < np.inf:
         raise MotionStyleError(f"motion {motion.id}: cannot resample to {rate_hz} Hz")
     if np.isclose(rate_hz, motion.rate_hz, rtol=1e-9):
         return motion
@@ -53,17 +69,16 @@ def resample(motion: Motion, rate_hz: float) -> Motion:
         )
     old = motion.times
     count = int(np.floor(old[-1] * rate_hz + 1e-6)) + 1
-    new = np.arange(count) / rate_hz
-    source = motion.coordinates
-    if rate_hz < motion.rate_hz and not motion.rebranched:
-        source = lowpass(source, motion.rate_hz, 0.4 * rate_hz)
+    new = np.minimum(np.arange(count) / rate_hz, old[-1])
+    cutoff = 0.4 * rate_hz if rate_hz < motion.rate_hz else np.inf
+    source = lowpass(motion.coordinates, motion.rate_hz, cutoff)
     coordinates = make_interp_spline(old, source, k=3)(new)
     rebranched: set[int] = set()
-    if motion.rebranched:
-        for block in EXPONENTIAL_BLOCKS:
-            turned = slerp(exponential(motion.coordinates[:, block]), old, new)
-            coordinates[:, block], jumps = unroll(logarithm(turned))
-            rebranched.update(jumps)
+    for block in _rebranched_blocks(motion):
+        turned = lowpass(_quaternions(motion.coordinates[:, block]), motion.rate_hz, cutoff)
+        matrices = slerp(Rotation.from_quat(turned).as_matrix(), old, new)
+        coordinates[:, block], jumps = unroll(logarithm(matrices))
+        rebranched.update(jumps)
     nearest = np.minimum(np.round(new * motion.rate_hz).astype(int), motion.frames - 1)
     forces = motion.contact_forces
     if forces is not None:
