@@ -1,6 +1,8 @@
 # What every rule file shares: the checked configuration, the sheets, and where things lie.
 
 from dataclasses import asdict
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -63,12 +65,22 @@ wildcard_constraints:
     planted="|".join(PLANTED) or "none",
 
 
+@cache
+def room_digest(room):
+    """Return a digest of the sources of one room of the package."""
+    digest = sha256()
+    for file in sorted(f for f in (PACKAGE / room).rglob("*") if f.suffix in {".py", ".j2"}):
+        if room or file.parent == PACKAGE:
+            digest.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
 def library(*rooms):
-    """Return the package's sources in these rooms, so that an edit reruns what it touches."""
-    files = sorted(PACKAGE.glob("*.py"))
-    for room in rooms:
-        files += sorted(f for f in (PACKAGE / room).rglob("*") if f.suffix in {".py", ".j2"})
-    return [str(f) for f in files]
+    """Return a digest of the package's sources in these rooms, as a parameter of a rule.
+
+    Snakemake reruns a job whose parameters changed, so an edit reruns what it touches.
+    """
+    return sha256("".join(room_digest(room) for room in ("", *rooms)).encode()).hexdigest()[:16]
 
 
 def source_file(row, name=None):

@@ -4,13 +4,13 @@
 rule fetch_embedded:
     output:
         files=[SOURCES / EMBEDDED / name for name in WHEEL.names],
-    params:
-        pin=CONFIG["embedded"],
     log:
         LOGS / "fetch_embedded.log",
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        pin=CONFIG["embedded"],
     script:
         "../scripts/fetch_embedded.py"
 
@@ -18,17 +18,17 @@ rule fetch_embedded:
 rule fetch_clip:
     output:
         file=SOURCES / "datasets/{path}",
+    log:
+        LOGS / "fetch/{path}.log",
+    threads: 1
+    resources:
+        mem_mb=200,
     params:
         entry=lambda wildcards: asdict(
             next(e for e in DATASETS.values() if e.path == wildcards.path)
         ),
         mirrors=CONFIG["mirrors"],
         root=str(ROOT),
-    log:
-        LOGS / "fetch/{path}.log",
-    threads: 1
-    resources:
-        mem_mb=200,
     script:
         "../scripts/fetch_clip.py"
 
@@ -38,12 +38,19 @@ rule retarget:
         clip=lambda wildcards: source_file(CLIPS[wildcards.clip]),
         skeleton_files=lambda wildcards: skeleton_files(CLIPS[wildcards.clip]),
         map=lambda wildcards: SKELETONS / f"{CLIPS[wildcards.clip].skeleton}.yaml",
-        library=library("body", "motion", "mocap"),
     output:
         motion=MOTIONS / "captured/{clip}.npz",
         sidecar=MOTIONS / "captured/{clip}.json",
         quality=RESULTS / "quality/{clip}.json",
+    log:
+        LOGS / "retarget/{clip}.log",
+    benchmark:
+        BENCHMARKS / "retarget/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
     params:
+        library=library("body", "motion", "mocap"),
         row=lambda wildcards: {
             k: str(v) if isinstance(v, Path) else v
             for k, v in asdict(CLIPS[wildcards.clip]).items()
@@ -53,13 +60,6 @@ rule retarget:
         retarget=CONFIG["retarget"],
         contacts=CONFIG["contacts"],
         body=CONFIG["body"],
-    log:
-        LOGS / "retarget/{clip}.log",
-    benchmark:
-        BENCHMARKS / "retarget/{clip}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1500,
     script:
         "../scripts/retarget.py"
 
@@ -67,7 +67,6 @@ rule retarget:
 rule mirror:
     input:
         motion=MOTIONS / "captured/{clip}.npz",
-        library=library("body", "motion"),
     output:
         motion=MOTIONS / "captured/{clip}_mirror.npz",
         sidecar=MOTIONS / "captured/{clip}_mirror.json",
@@ -76,6 +75,8 @@ rule mirror:
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        library=library("body", "motion"),
     script:
         "../scripts/mirror.py"
 
@@ -84,7 +85,6 @@ rule plant:
     input:
         motions=sorted({str(MOTIONS / f"captured/{r.base}.npz") for r in PLANTED.values()}),
         catalogue=CONFIG["planted"],
-        library=library("body", "motion", "mocap"),
     output:
         motions=[MOTIONS / "planted" / f"{id}.npz" for id in PLANTED],
         sidecars=[MOTIONS / "planted" / f"{id}.json" for id in PLANTED],
@@ -95,6 +95,8 @@ rule plant:
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        library=library("body", "motion", "mocap"),
     script:
         "../scripts/plant.py"
 
@@ -103,16 +105,16 @@ rule clips_table:
     input:
         quality=[RESULTS / "quality" / f"{id}.json" for id in CLIPS],
         motions=[MOTIONS / "captured" / f"{id}.npz" for id in CLIPS],
-        library=library("body", "motion", "evaluation"),
     output:
         table=RESULTS / "tables/clips.csv",
-    params:
-        config=CONFIG["name"],
     log:
         LOGS / "clips_table.log",
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        library=library("body", "motion", "evaluation"),
+        config=CONFIG["name"],
     script:
         "../scripts/clips_table.py"
 
@@ -120,17 +122,17 @@ rule clips_table:
 rule motions_table:
     input:
         motions=motion_files(),
-        library=library("motion"),
     output:
         table=RESULTS / "tables/motions.csv",
-    params:
-        config=CONFIG["name"],
-        folder=str(MOTIONS),
     log:
         LOGS / "motions_table.log",
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        library=library("motion"),
+        config=CONFIG["name"],
+        folder=str(MOTIONS),
     script:
         "../scripts/motions_table.py"
 
@@ -138,7 +140,6 @@ rule motions_table:
 rule bvh:
     input:
         motion=MOTIONS / "{kind}/{id}.npz",
-        library=library("body", "motion"),
     output:
         bvh=RESULTS / "bvh/{kind}/{id}.bvh",
     log:
@@ -146,5 +147,7 @@ rule bvh:
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        library=library("body", "motion"),
     script:
         "../scripts/bvh.py"

@@ -4,7 +4,6 @@
 rule figure_body:
     input:
         motion=MOTIONS / "captured" / f"{SHOWN['body'][0]}.npz",
-        library=library("body", "motion", "figures"),
     output:
         svg=RESULTS / "figures/body.svg",
         png=RESULTS / "figures/body.png",
@@ -13,6 +12,8 @@ rule figure_body:
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        library=library("body", "motion", "figures"),
     script:
         "../scripts/figure_body.py"
 
@@ -20,7 +21,6 @@ rule figure_body:
 rule figure_strips:
     input:
         motions=[MOTIONS / f"captured/{id}.npz" for id in SHOWN["strips"]],
-        library=library("body", "motion", "evaluation", "figures"),
     output:
         svg=RESULTS / "figures/strips.svg",
         png=RESULTS / "figures/strips.png",
@@ -29,26 +29,30 @@ rule figure_strips:
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        library=library("body", "motion", "evaluation", "figures"),
     script:
         "../scripts/figure_strips.py"
 
 
 use rule figure_strips as figure_planted with:
     input:
-        motions=[MOTIONS / f"planted/{id}.npz" for id in list(PLANTED)[:: max(1, len(PLANTED) // 6)]],
-        library=library("body", "motion", "evaluation", "figures"),
+        motions=[
+            MOTIONS / f"planted/{id}.npz" for id in list(PLANTED)[:: max(1, len(PLANTED) // 6)]
+        ],
     output:
         svg=RESULTS / "figures/planted.svg",
         png=RESULTS / "figures/planted.png",
     log:
         LOGS / "figures/planted.log",
+    params:
+        library=library("body", "motion", "evaluation", "figures"),
 
 
 rule figure_gait:
     input:
         motions=[MOTIONS / f"captured/{id}.npz" for id in SHOWN["gait"]],
         normative=CONFIG["normative"],
-        library=library("body", "motion", "evaluation", "figures"),
     output:
         svg=RESULTS / "figures/gait.svg",
         png=RESULTS / "figures/gait.png",
@@ -57,6 +61,8 @@ rule figure_gait:
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        library=library("body", "motion", "evaluation", "figures"),
     script:
         "../scripts/figure_gait.py"
 
@@ -64,7 +70,6 @@ rule figure_gait:
 rule figure_markers:
     input:
         quality=[RESULTS / f"quality/{id}.json" for id in SHOWN["markers"]],
-        library=library("figures"),
     output:
         svg=RESULTS / "figures/markers.svg",
         png=RESULTS / "figures/markers.png",
@@ -73,6 +78,8 @@ rule figure_markers:
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        library=library("figures"),
     script:
         "../scripts/figure_markers.py"
 
@@ -87,17 +94,17 @@ rule report:
         schema=ROOT / "workflow/schemas/claims.schema.json",
         captions=ROOT / "workflow/report/captions.yaml",
         figures=[RESULTS / f"figures/{name}.png" for name in FIGURES],
-        library=library("evaluation", "report"),
     output:
         page=RESULTS / "report.html",
-    params:
-        results=str(RESULTS),
-        config=CONFIG["name"],
     log:
         LOGS / "report.log",
     threads: 1
     resources:
         mem_mb=1000,
+    params:
+        library=library("evaluation", "report"),
+        results=str(RESULTS),
+        config=CONFIG["name"],
     script:
         "../scripts/report.py"
 
@@ -108,31 +115,33 @@ rule check_clips:
         report=RESULTS / "report.html",
     output:
         stamp=RESULTS / "status/clips.ok",
-    params:
-        allow=CONFIG["allow_failed_clips"],
     log:
         LOGS / "check_clips.log",
     threads: 1
     resources:
         mem_mb=200,
+    params:
+        allow=CONFIG["allow_failed_clips"],
     script:
         "../scripts/check_clips.py"
 
 
 rule publish:
     input:
-        tables=[RESULTS / f"tables/{name}.csv" for name in ("clips", "gait_bands", "gait", "claims")],
+        tables=[
+            RESULTS / f"tables/{name}.csv" for name in ("clips", "gait_bands", "gait", "claims")
+        ],
         figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],
         stamp=RESULTS / "status/clips.ok",
         datasets=CONFIG["datasets"],
-    params:
-        config=CONFIG["name"],
-        folder=str(ROOT / "results/published"),
-        used=sorted({(row.dataset or "own", row.path) for row in CLIPS.values()}),
     log:
         LOGS / "publish.log",
     threads: 1
     resources:
         mem_mb=200,
+    params:
+        config=CONFIG["name"],
+        folder=str(ROOT / "results/published"),
+        used=sorted({(row.dataset or "own", row.path) for row in CLIPS.values()}),
     script:
         "../scripts/publish.py"

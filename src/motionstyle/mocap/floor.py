@@ -11,6 +11,8 @@ from motionstyle.mocap.clip import SkeletonClip
 
 Array = NDArray[np.float64]
 
+LEAST_SIGNIFICANCE = 4.0  # slope over its standard error, for a tilt to be believed
+
 
 @dataclass(frozen=True)
 class StanceThresholds:
@@ -136,16 +138,32 @@ def fit_floor(
     if not level:
         return FloorFit(float(np.quantile(heights, 0.1)), 0.0, 0.0, len(stances), span_m)
     usable = directions[span >= shortest_span_m] if len(stances) >= 3 else directions[:0]
-    design = np.column_stack([np.ones(len(spots)), spread @ usable.T])
-    weights = np.ones(len(spots))
-    for _ in range(20):  # Huber weights: a foot caught in mid-air must not tilt the floor
+    solution, significance = _robust_plane(spread @ usable.T, heights)
+    if len(usable) and (significance < LEAST_SIGNIFICANCE).any():
+        usable = usable[significance >= LEAST_SIGNIFICANCE]
+        solution, _ = _robust_plane(spread @ usable.T, heights)
+    slope = solution[1:] @ usable if len(usable) else np.zeros(2)
+    offset = float(solution[0] - slope @ centre)
+    return FloorFit(offset, float(slope[0]), float(slope[1]), len(stances), span_m)
+
+
+def _robust_plane(along: Array, heights: Array) -> tuple[Array, Array]:
+    """Fit heights (S,) linearly along directions (S, D); return (1 + D,) and slope/error (D,).
+
+    Huber weights: a foot caught in mid-air must not tilt the floor.
+    """
+    design = np.column_stack([np.ones(len(heights)), along])
+    weights = np.ones(len(heights))
+    for _ in range(20):
         solution = np.linalg.lstsq(design * weights[:, None], heights * weights, rcond=None)[0]
         residual = np.abs(heights - design @ solution)
         scale = max(float(np.median(residual)), 2e-3)
         weights = np.sqrt(np.minimum(1.0, 1.5 * scale / np.maximum(residual, 1e-12)))
-    slope = solution[1:] @ usable if len(usable) else np.zeros(2)
-    offset = float(solution[0] - slope @ centre)
-    return FloorFit(offset, float(slope[0]), float(slope[1]), len(stances), span_m)
+    weighted = design * weights[:, None]
+    freedom = max(len(heights) - design.shape[1], 1)
+    variance = max(float(((residual * weights) ** 2).sum()) / freedom, 1e-6)
+    errors = np.sqrt(variance * np.diag(np.linalg.pinv(weighted.T @ weighted)))
+    return solution, np.abs(solution[1:]) / np.maximum(errors[1:], 1e-12)
 
 
 def move_clip(clip: SkeletonClip, rotation: Array, translation: Array) -> SkeletonClip:
