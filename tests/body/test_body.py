@@ -28,10 +28,17 @@ ROWS = {
 }
 
 
-def lengths(geometry):
+def lengths(geometry, sex):
     """Segment lengths (m) between the table's end points, feet whole."""
+    trunk = sum(geometry.joint_offsets[NODE_INDEX[n]] for n in ("abdomen", "thorax", "head"))
+    hips = [geometry.joint_offsets[NODE_INDEX[f"thigh_{side}"]] for side in "rl"]
+    trunk_length = float(np.linalg.norm(trunk - sum(hips) / 2))
+    parts = TRUNK_LENGTHS[sex]
     norm = {n: float(np.linalg.norm(geometry.joint_offsets[i])) for n, i in NODE_INDEX.items()}
-    found = {"pelvis": norm["abdomen"], "abdomen": norm["thorax"], "thorax": norm["head"]}
+    found = {
+        node: part / sum(parts) * trunk_length
+        for node, part in zip(("pelvis", "abdomen", "thorax"), parts, strict=True)
+    }
     found["head"] = float(np.linalg.norm(geometry.end_points[0]))
     for side, tip in zip("rl", geometry.end_points[1:], strict=True):
         found[f"thigh_{side}"] = norm[f"shank_{side}"]
@@ -40,6 +47,31 @@ def lengths(geometry):
         found[f"forearm_{side}"] = norm[f"hand_{side}"]
         found[f"hand_{side}"] = float(np.linalg.norm(tip))
     return found
+
+
+# Typed from the published table, apart from the program's own copy: mass %, COM %, r_s, r_t, r_l.
+PUBLISHED = """
+head         6.94 50.02 30.3 31.5 26.1   6.68 48.41 27.1 29.5 26.1
+upper_trunk 15.96 50.66 50.5 32.0 46.5  15.45 50.50 46.6 31.4 44.9
+middle_trunk 16.33 45.02 48.2 38.3 46.8 14.65 45.12 43.3 35.4 41.5
+lower_trunk 11.17 61.15 61.5 55.1 58.7  12.47 49.20 43.3 40.2 44.4
+upper_arm    2.71 57.72 28.5 26.9 15.8   2.55 57.54 27.8 26.0 14.8
+forearm      1.62 45.74 27.6 26.5 12.1   1.38 45.59 26.1 25.7  9.4
+hand         0.61 36.24 28.8 23.5 18.4   0.56 34.27 24.4 20.8 15.4
+thigh       14.16 40.95 32.9 32.9 14.9  14.78 36.12 36.9 36.4 16.2
+shank        4.33 43.95 25.1 24.6 10.2   4.81 43.52 26.7 26.3  9.2
+foot         1.37 44.15 25.7 24.5 12.4   1.29 40.14 29.9 27.9 13.9
+"""
+
+
+def test_the_tables_are_the_published_ones():
+    lines = [line.split() for line in PUBLISHED.split("\n") if line]
+    assert {name for name, *_ in lines} == set(DE_LEVA["male"]) == set(DE_LEVA["female"])
+    for name, *values in lines:
+        for sex, part in (("male", values[:5]), ("female", values[5:])):
+            row = DE_LEVA[sex][name]
+            found = [row.mass, row.com, row.sagittal, row.transverse, row.longitudinal]
+            assert np.allclose(found, np.array(part, dtype=float) / 100, rtol=1e-12), (sex, name)
 
 
 def test_the_tables_sum_to_100_00_and_99_99_percent():
@@ -90,7 +122,7 @@ def test_centre_of_mass_of_a_standing_person(plain_geometry, standing, sex):
 
 
 def test_segment_centres_lie_at_the_table_s_fractions(plain_geometry, plain_body):
-    long = lengths(plain_geometry)
+    long = lengths(plain_geometry, SEX)
     table = DE_LEVA["male"]
     thigh = [0, -table["thigh"].com * long["thigh_r"], 0]
     assert np.allclose(plain_body.coms[THIGH], thigh, atol=1e-12)
@@ -115,7 +147,7 @@ def test_rear_foot_and_toes_together_balance_like_the_whole_foot(plain_geometry,
 @pytest.mark.parametrize("sex", ["male", "female"])
 def test_table_inertias_are_m_r_l_squared(plain_geometry, sex):
     body = build_body(plain_geometry, 68.0, sex)
-    long = lengths(plain_geometry)
+    long = lengths(plain_geometry, SEX)
     for node, name in ROWS.items():
         i, row = NODE_INDEX[node], DE_LEVA[sex][name]
         radii = np.array([row.sagittal, row.longitudinal, row.transverse])
@@ -180,7 +212,7 @@ def test_ellipsoids_have_the_density_of_water_and_the_segment_s_length(plain_geo
     body = build_body(plain_geometry, 73.0, "female", inertia="ellipsoid")
     volumes = 4 / 3 * np.pi * body.semi_axes.prod(axis=1)
     assert np.allclose(body.masses / volumes, DENSITY, rtol=1e-9)
-    for node, length in lengths(plain_geometry).items():
+    for node, length in lengths(plain_geometry, SEX).items():
         assert np.isclose(body.semi_axes[NODE_INDEX[node], 1], length / 2, rtol=1e-9), node
 
 
