@@ -46,7 +46,7 @@ def write_json(path: str | Path, value: object) -> None:
         handle.write("\n")
 
 
-def read_json(path: str | Path) -> Any:
+def read_json(path: str | Path) -> Any:  # noqa: ANN401 - whatever the JSON holds
     """Read one JSON file."""
     return json.loads(Path(path).read_text(encoding="utf-8"))
 

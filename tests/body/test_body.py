@@ -11,6 +11,7 @@ from motionstyle.body.anthropometry import (
     BALL_FRACTION,
     DE_LEVA,
     REARFOOT_MASS_FRACTION,
+    TRUNK_LENGTHS,
     total_mass,
 )
 from motionstyle.body.body import DENSITY, build_body
@@ -122,7 +123,7 @@ def test_centre_of_mass_of_a_standing_person(plain_geometry, standing, sex):
 
 
 def test_segment_centres_lie_at_the_table_s_fractions(plain_geometry, plain_body):
-    long = lengths(plain_geometry, SEX)
+    long = lengths(plain_geometry, "male")
     table = DE_LEVA["male"]
     thigh = [0, -table["thigh"].com * long["thigh_r"], 0]
     assert np.allclose(plain_body.coms[THIGH], thigh, atol=1e-12)
@@ -147,7 +148,7 @@ def test_rear_foot_and_toes_together_balance_like_the_whole_foot(plain_geometry,
 @pytest.mark.parametrize("sex", ["male", "female"])
 def test_table_inertias_are_m_r_l_squared(plain_geometry, sex):
     body = build_body(plain_geometry, 68.0, sex)
-    long = lengths(plain_geometry, SEX)
+    long = lengths(plain_geometry, sex)
     for node, name in ROWS.items():
         i, row = NODE_INDEX[node], DE_LEVA[sex][name]
         radii = np.array([row.sagittal, row.longitudinal, row.transverse])
@@ -212,7 +213,7 @@ def test_ellipsoids_have_the_density_of_water_and_the_segment_s_length(plain_geo
     body = build_body(plain_geometry, 73.0, "female", inertia="ellipsoid")
     volumes = 4 / 3 * np.pi * body.semi_axes.prod(axis=1)
     assert np.allclose(body.masses / volumes, DENSITY, rtol=1e-9)
-    for node, length in lengths(plain_geometry, SEX).items():
+    for node, length in lengths(plain_geometry, "female").items():
         assert np.isclose(body.semi_axes[NODE_INDEX[node], 1], length / 2, rtol=1e-9), node
 
 
@@ -235,3 +236,19 @@ def test_left_and_right_of_a_symmetric_geometry_are_equal(plain_body):
 def test_leg_length_is_hip_to_ankle(plain_body):
     assert np.isclose(plain_body.leg_length, 1.74 / 1.7837 * (0.4222 + 0.4403), rtol=1e-9)
     assert plain_body.mass_source == "given"
+
+
+def test_the_trunk_weighs_the_same_wherever_a_skeleton_has_its_spine_joints(plain_geometry):
+    offsets = np.array(plain_geometry.joint_offsets)
+    rise = np.array([0.0, 0.06, 0.0])
+    offsets[NODE_INDEX["abdomen"]] += rise
+    offsets[NODE_INDEX["thorax"]] -= rise
+    one = build_body(plain_geometry, 70.0)
+    other = build_body(replace(plain_geometry, joint_offsets=offsets), 70.0)
+    np.testing.assert_allclose(other.inertias, one.inertias, rtol=1e-12)
+    still = np.zeros((1, 35))
+    np.testing.assert_allclose(
+        centre_of_mass(other, forward_kinematics(other, still)),
+        centre_of_mass(one, forward_kinematics(one, still)),
+        atol=1e-12,
+    )

@@ -51,14 +51,14 @@ def test_one_row_per_joint_and_instant_with_the_mean_of_both_legs(walk, normativ
     rows = band_table([walk], normative, "test")
     assert len(rows) == 12
     assert all(tuple(row) == BAND_COLUMNS for row in rows)
-    by_key = {(row["joint"], row["percent_of_cycle"]): row for row in rows}
+    by_key = {(row["joint"], row["cycle_pct"]): row for row in rows}
     row = by_key["knee", 25]
     assert row["mean_deg"] == pytest.approx(joint_cycles(walk, "knee_flexion")[:, 25].mean(), 1e-5)
     assert (row["low_deg"], row["midpoint_deg"], row["high_deg"]) == (1, 11, 21)
     assert row["cycles"] == 6
     for row in rows:
         expected = row["low_deg"] <= row["mean_deg"] <= row["high_deg"]
-        assert row["inside"] == ("yes" if expected else "no")
+        assert row["inside_band"] == ("yes" if expected else "no")
 
 
 def test_an_angle_at_its_midpoint_is_inside_and_one_beyond_its_limit_is_not(walk, normative):
@@ -68,7 +68,7 @@ def test_an_angle_at_its_midpoint_is_inside_and_one_beyond_its_limit_is_not(walk
         q = walk.coordinates.copy()
         q[:, column] = np.radians(degrees)
         rows = band_table([replace(walk, coordinates=q)], normative, "test")
-        keys = {(r["joint"], r["percent_of_cycle"]): r["inside"] for r in rows}
+        keys = {(r["joint"], r["cycle_pct"]): r["inside_band"] for r in rows}
         return keys["ankle", 25]
 
     assert [ankle_at(a) for a in (8, 13.1, 2.9)] == ["yes", "no", "no"]
@@ -78,7 +78,7 @@ def test_a_motion_without_cycles_has_rows_without_means(walk, normative):
     rows = band_table([walk.window(0, 60)], normative, "test")
     assert len(rows) == 12
     assert all(np.isnan(r["mean_deg"]) for r in rows)
-    assert {(r["inside"], r["cycles"]) for r in rows} == {("", 0)}
+    assert {(r["inside_band"], r["cycles"]) for r in rows} == {("", 0)}
 
 
 def test_the_gait_row_of_the_synthetic_walk(walk, normative):

@@ -1,4 +1,4 @@
-# What every rule file shares: the checked configuration, the sheets, and where things lie.
+# Shared by all files here: the checked configuration, the sheets, and where things lie.
 
 from dataclasses import asdict
 from functools import cache
@@ -109,7 +109,7 @@ def motion_files():
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
-TABLES = [RESULTS / f"tables/{name}.csv" for name in ("clips", "motions", "gait_bands", "gait")]
+TABLES = [RESULTS / f"tables/{name}.csv" for name in ("clips", "motions", "gait_angles", "gait")]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {

@@ -7,9 +7,11 @@ rule gait_tables:
         normative=CONFIG["normative"],
     output:
         gait=RESULTS / "tables/gait.csv",
-        bands=RESULTS / "tables/gait_bands.csv",
+        angles=RESULTS / "tables/gait_angles.csv",
     log:
         LOGS / "gait_tables.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -29,11 +31,12 @@ rule claims:
         table=RESULTS / "tables/claims.csv",
     log:
         LOGS / "claims.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=500,
     params:
         library=library("evaluation"),
-        results=str(RESULTS),
     script:
         "../scripts/claims.py"

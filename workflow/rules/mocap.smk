@@ -6,6 +6,8 @@ rule fetch_embedded:
         files=[SOURCES / EMBEDDED / name for name in WHEEL.names],
     log:
         LOGS / "fetch_embedded.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=500,
@@ -20,6 +22,8 @@ rule fetch_clip:
         file=SOURCES / "datasets/{path}",
     log:
         LOGS / "fetch/{path}.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=200,
@@ -46,6 +50,8 @@ rule retarget:
         LOGS / "retarget/{clip}.log",
     benchmark:
         BENCHMARKS / "retarget/{clip}.tsv"
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1500,
@@ -72,6 +78,8 @@ rule mirror:
         sidecar=MOTIONS / "captured/{clip}_mirror.json",
     log:
         LOGS / "mirror/{clip}.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=500,
@@ -92,6 +100,8 @@ rule plant:
         LOGS / "plant.log",
     benchmark:
         BENCHMARKS / "plant.tsv"
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -109,6 +119,8 @@ rule clips_table:
         table=RESULTS / "tables/clips.csv",
     log:
         LOGS / "clips_table.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=500,
@@ -126,13 +138,14 @@ rule motions_table:
         table=RESULTS / "tables/motions.csv",
     log:
         LOGS / "motions_table.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=500,
     params:
         library=library("motion"),
         config=CONFIG["name"],
-        folder=str(MOTIONS),
     script:
         "../scripts/motions_table.py"
 
@@ -144,6 +157,8 @@ rule bvh:
         bvh=RESULTS / "bvh/{kind}/{id}.bvh",
     log:
         LOGS / "bvh/{kind}/{id}.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=500,

@@ -9,6 +9,8 @@ rule figure_body:
         png=RESULTS / "figures/body.png",
     log:
         LOGS / "figures/body.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -26,6 +28,8 @@ rule figure_strips:
         png=RESULTS / "figures/strips.png",
     log:
         LOGS / "figures/strips.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -58,6 +62,8 @@ rule figure_gait:
         png=RESULTS / "figures/gait.png",
     log:
         LOGS / "figures/gait.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -75,6 +81,8 @@ rule figure_markers:
         png=RESULTS / "figures/markers.png",
     log:
         LOGS / "figures/markers.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -98,12 +106,13 @@ rule report:
         page=RESULTS / "report.html",
     log:
         LOGS / "report.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1000,
     params:
         library=library("evaluation", "report"),
-        results=str(RESULTS),
         config=CONFIG["name"],
     script:
         "../scripts/report.py"
@@ -117,6 +126,8 @@ rule check_clips:
         stamp=RESULTS / "status/clips.ok",
     log:
         LOGS / "check_clips.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=200,
@@ -129,13 +140,15 @@ rule check_clips:
 rule publish:
     input:
         tables=[
-            RESULTS / f"tables/{name}.csv" for name in ("clips", "gait_bands", "gait", "claims")
+            RESULTS / f"tables/{name}.csv" for name in ("clips", "gait_angles", "gait", "claims")
         ],
         figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],
         stamp=RESULTS / "status/clips.ok",
         datasets=CONFIG["datasets"],
     log:
         LOGS / "publish.log",
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=200,

@@ -5,6 +5,7 @@ from motionstyle.evaluation.normative import (
     GAIT_COLUMNS,
     band_table,
     gait_row,
+    is_level_walk,
     read_normative,
 )
 from motionstyle.jobs import job
@@ -15,5 +16,6 @@ with job(snakemake.log[0]):
     motions = load_available(snakemake.input.motions)
     normative, config = read_normative(snakemake.input.normative), snakemake.params.config
     rows = [gait_row(motion, normative, config) for motion in motions]
+    walks = [motion for motion in motions if is_level_walk(motion, normative)]
     write_table(snakemake.output.gait, GAIT_COLUMNS, rows)
-    write_table(snakemake.output.bands, BAND_COLUMNS, band_table(motions, normative, config))
+    write_table(snakemake.output.angles, BAND_COLUMNS, band_table(walks, normative, config))

@@ -68,6 +68,12 @@ REFERENCE_LENGTHS: dict[Sex, dict[str, float]] = {
     "female": {"thigh": 0.3685, "shank": 0.4386, "foot": 0.2283, "head": 0.2437, "hand": 0.1701},
 }
 
+# Lower, middle and upper trunk (mid-hip→omphalion→xiphion→cervicale), m.
+TRUNK_LENGTHS: dict[Sex, tuple[float, float, float]] = {
+    "male": (0.1457, 0.2155, 0.2421),
+    "female": (0.1815, 0.2053, 0.2280),
+}
+
 # Where the ball of the foot lies between heel and toe tip, and its share of the foot's mass
 # behind it (our choice, nio.md §3).
 BALL_FRACTION = 0.70

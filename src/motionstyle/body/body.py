@@ -18,6 +18,7 @@ from motionstyle.body.anthropometry import (
     DE_LEVA,
     REARFOOT_MASS_FRACTION,
     TOES_COM_FRACTION,
+    TRUNK_LENGTHS,
     Sex,
     total_mass,
 )
@@ -87,17 +88,27 @@ class Body:
         return float(sum(lengths) / 2)
 
 
-def _ends(geometry: BodyGeometry) -> dict[str, tuple[str, Array, Array]]:
-    """Map each node to (table row, first end, other end) in its own frame."""
+def _ends(geometry: BodyGeometry, sex: Sex) -> dict[str, tuple[str, Array, Array]]:
+    """Map each node to (table row, first end, other end) in its own frame.
+
+    The trunk's parts are cut where the table cuts them, in its proportions along the line from
+    mid-hip to neck, and not at the spine joints, which every source skeleton puts elsewhere.
+    """
     offset = {name: geometry.joint_offsets[i] for i, name in enumerate(NODES)}
     points = dict(zip(CONTACT_POINTS, geometry.contact_points, strict=True))
     head_top, *fingertips = geometry.end_points
     origin = np.zeros(3)
     mid_hip = (offset["thigh_r"] + offset["thigh_l"]) / 2
+    thorax = offset["abdomen"] + offset["thorax"]
+    neck = thorax + offset["head"]
+    lower, middle, upper = TRUNK_LENGTHS[sex]
+    whole = lower + middle + upper
+    omphalion = mid_hip + lower / whole * (neck - mid_hip)
+    xiphion = mid_hip + (lower + middle) / whole * (neck - mid_hip)
     ends = {
-        "pelvis": ("lower_trunk", offset["abdomen"], mid_hip),
-        "abdomen": ("middle_trunk", offset["thorax"], origin),
-        "thorax": ("upper_trunk", offset["head"], origin),
+        "pelvis": ("lower_trunk", omphalion, mid_hip),
+        "abdomen": ("middle_trunk", xiphion - offset["abdomen"], omphalion - offset["abdomen"]),
+        "thorax": ("upper_trunk", neck - thorax, xiphion - thorax),
         "head": ("head", head_top, origin),
     }
     for side, fingertip in zip("rl", fingertips, strict=True):
@@ -155,7 +166,7 @@ def build_body(
     count = len(NODES)
     masses, coms = np.zeros(count), np.zeros((count, 3))
     inertias, semi_axes = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    for node, (row_name, first, other) in _ends(geometry).items():
+    for node, (row_name, first, other) in _ends(geometry, sex).items():
         i, row = NODE_INDEX[node], table[row_name]
         along = other - first
         length = float(np.linalg.norm(along))
@@ -185,6 +196,8 @@ def build_body(
         else:
             moments = mass * gyration**2
         masses[i], coms[i] = mass, first + com * along
+        if row_name == "foot":  # halfway between the sole and the joint above it
+            coms[i, 1] /= 2
         inertias[i] = np.diag(moments)
         semi_axes[i] = np.sqrt(
             np.maximum(5 / (2 * mass) * (moments.sum() - 2 * moments), (0.1 * length) ** 2)

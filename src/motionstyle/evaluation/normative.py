@@ -1,4 +1,4 @@
-"""Gait against published values: `tables/gait.csv` and `tables/gait_bands.csv`.
+"""Gait against published values: `tables/gait.csv` and `tables/gait_angles.csv`.
 
 The values and their sources stand in `config/normative_gait.yaml` (biomechanics.md §4).
 """
@@ -34,12 +34,12 @@ BAND_COLUMNS: tuple[str, ...] = (
     "action",
     "surface",
     "joint",
-    "percent_of_cycle",
+    "cycle_pct",
     "mean_deg",
     "low_deg",
     "midpoint_deg",
     "high_deg",
-    "inside",
+    "inside_band",
     "cycles",
 )
 GAIT_COLUMNS: tuple[str, ...] = (

@@ -19,7 +19,7 @@ def ground_height(points: Array, rate_hz: float, *, level: bool) -> Array:
     """
     if level:
         return np.zeros(points.shape[:2])
-    window = max(1, int(round(0.5 * rate_hz)))
+    window = max(1, round(0.5 * rate_hz))
     padded = np.pad(points[..., 1], ((window, window), (0, 0)), mode="edge")
     views = np.lib.stride_tricks.sliding_window_view(padded, 2 * window + 1, axis=0)
     return views.min(axis=-1)

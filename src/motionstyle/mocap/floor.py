@@ -77,11 +77,11 @@ def hysteresis(
     for first, last in runs(inside):
         if core[first : last + 1].any():
             bearing[first : last + 1] = True
-    gap = int(round(thresholds.gap_s * rate_hz))
+    gap = round(thresholds.gap_s * rate_hz)
     for first, last in runs(~bearing):
         if first > 0 and last < len(bearing) - 1 and last - first + 1 <= gap:
             bearing[first : last + 1] = True
-    shortest = max(2, int(round(thresholds.shortest_s * rate_hz)))
+    shortest = max(2, round(thresholds.shortest_s * rate_hz))
     for first, last in runs(bearing):
         if last - first + 1 < shortest and first > 0 and last < len(bearing) - 1:
             bearing[first : last + 1] = False
@@ -97,7 +97,7 @@ def standing_points(
     side), so that slopes and steps do not hide stances.
     """
     speeds = speed(points, rate_hz)
-    window = max(1, int(round(rate_hz)))
+    window = max(1, round(rate_hz))
     found = []
     for p in range(points.shape[1]):
         height = points[:, p, 1]

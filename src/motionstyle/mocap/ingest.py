@@ -31,14 +31,13 @@ from motionstyle.mocap.checks import check_clip
 from motionstyle.mocap.clip import SkeletonClip
 from motionstyle.mocap.contacts import detect_contacts, ground_height
 from motionstyle.mocap.floor import FloorFit, StanceThresholds, fit_floor, move_clip
+from motionstyle.mocap.markers import marker_distances, place_markers
 from motionstyle.mocap.readers import read_clip
 from motionstyle.mocap.retarget import (
     copied_angles,
     fit_coordinates,
     fit_legs_to_ground,
     make_continuous,
-    marker_distances,
-    place_markers,
 )
 from motionstyle.mocap.settings import RetargetSettings, by_action
 from motionstyle.mocap.sheet import ClipRow

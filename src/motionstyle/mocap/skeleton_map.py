@@ -21,11 +21,14 @@ from motionstyle.body.layout import NODES
 from motionstyle.errors import MotionStyleError, near_matches
 from motionstyle.mocap.clip import SkeletonClip, forward_kinematics
 
-END_NAMES = ("head_top", "fingertip_r", "fingertip_l", "wrist_r", "wrist_l") + tuple(
-    f"{point}_{side}" for side in "rl" for point in ("toe", "foot_front")
+END_NAMES = (
+    "head_top",
+    *(f"{end}_{side}" for end in ("toe", "foot_front", "fingertip", "wrist") for side in "rl"),
 )
-REQUIRED_NODES = ("pelvis", "abdomen", "head") + tuple(
-    f"{node}_{side}" for side in "rl" for node in ("thigh", "shank", "foot", "upper_arm", "forearm")
+_LIMB_NODES = ("thigh", "shank", "foot", "upper_arm", "forearm")
+REQUIRED_NODES = (
+    *("pelvis", "abdomen", "head"),
+    *(f"{node}_{side}" for node in _LIMB_NODES for side in "rl"),
 )
 _KEYS = {"joints", "frames", "ends", "ignored", "zero_pose", "axes", "offsets_like", "note"}
 _DIRECTIONS = {
