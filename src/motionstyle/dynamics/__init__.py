@@ -1,0 +1,1 @@
+"""Inverse dynamics of the body with contact, passive and shoe forces; generated code."""
