@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from motionstyle.mocap.clip import SkeletonClip, forward_kinematics
+from motionstyle.mocap.floor import runs
 
 FLIP = np.radians(120.0)
 RETURN = np.radians(60.0)
@@ -105,13 +106,6 @@ def repair_flips(clip: SkeletonClip, flips: Sequence[tuple[int, int]]) -> Skelet
         parents, offsets[touched], local[touched]
     )
     return replace(clip, positions=positions, rotations=rotations)
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return (first, last) of every run of true values."""
-    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
-    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return [(int(one), int(two) - 1) for one, two in zip(starts, stops, strict=True)]
 
 
 def frame_list(frames: NDArray[np.int64]) -> str:

@@ -12,6 +12,8 @@ from motionstyle.mocap.clip import SkeletonClip
 Array = NDArray[np.float64]
 
 LEAST_SIGNIFICANCE = 4.0  # slope over its standard error, for a tilt to be believed
+CUT_STANCE_S = 0.2  # a stance cut off by the clip's end must be this long to tell the floor
+NEARBY_S = 0.5  # on either side of a frame, where a foot's lowest level is looked for
 
 
 @dataclass(frozen=True)
@@ -93,11 +95,12 @@ def standing_points(
 ) -> list[tuple[int, int, int]]:
     """Return stances (point, first, last) of foot points (F, P, 3) on an unknown floor.
 
-    A point stands where it is slow and low against its own lowest level nearby (1 s on either
-    side), so that slopes and steps do not hide stances.
+    A point stands where it is slow and low against its own lowest level nearby (0.5 s on either
+    side), so that slopes and steps do not hide stances: a foot's former stance on a floor that
+    rises by 1.3° lies 4 cm lower, and must be out of sight.
     """
     speeds = speed(points, rate_hz)
-    window = max(1, round(rate_hz))
+    window = max(1, round(NEARBY_S * rate_hz))
     found = []
     for p in range(points.shape[1]):
         height = points[:, p, 1]
@@ -126,6 +129,13 @@ def fit_floor(
     shortest_span_m : stances must spread this far along a direction for a slope to be fitted.
     """
     stances = standing_points(points, rate_hz, thresholds)
+    # a foot still falling when the clip ends is at its lowest there, and would tilt the floor
+    whole = [
+        (p, a, b)
+        for p, a, b in stances
+        if (a > 0 and b < len(points) - 1) or b - a + 1 >= CUT_STANCE_S * rate_hz
+    ]
+    stances = whole or stances
     if not stances:
         return FloorFit(float(np.quantile(points[..., 1], 0.01)), 0.0, 0.0, 0, 0.0)
     spots = np.array([np.median(points[a : b + 1, p], axis=0) for p, a, b in stances])

@@ -226,7 +226,7 @@ def _onto_floor(
     length = foot_length(float(leg), sex)
     lowest = LOWEST_BALL * length if toes else 0.0
     usual = 0.1 * length if toes else 0.0
-    above = float(np.clip(height, lowest, PLAUSIBLE_BALL_M)) if not tilted else usual
+    above = height if lowest <= height <= PLAUSIBLE_BALL_M and not tilted else usual
     shift = -(turn @ frames.positions["pelvis"][0]) * [1, 0, 1] - [0, height - above, 0]
     return move_clip(clip, turn, shift), floor
 

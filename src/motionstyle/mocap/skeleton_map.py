@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -30,7 +31,8 @@ REQUIRED_NODES = (
     *("pelvis", "abdomen", "head"),
     *(f"{node}_{side}" for node in _LIMB_NODES for side in "rl"),
 )
-_KEYS = {"joints", "frames", "ends", "ignored", "zero_pose", "axes", "offsets_like", "note"}
+_SECTIONS = ("joints", "frames", "ends", "axes", "offsets_like")
+_KEYS = {*_SECTIONS, "ignored", "zero_pose", "note"}
 _DIRECTIONS = {
     sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[i]
     for sign in "+-"
@@ -66,17 +68,47 @@ class SkeletonMap:
         return self.frames.get(node, self.joints[node])
 
 
-def _axes(path: Path, node: str, text: str) -> np.ndarray:
+def _axes(node: str, text: object, problems: list[str]) -> np.ndarray:
+    """Return the rotation a text such as '+z +x +y' stands for; note it if it stands for none."""
     words = str(text).split()
     if len(words) != 3 or any(w not in _DIRECTIONS for w in words):
-        raise MotionStyleError(
-            f"{path}: axes of {node} are '{text}'; write the source joint's local axes that point "
+        problems.append(
+            f"axes of {node} are '{text}'; write the source joint's local axes that point "
             "forward, up and right, such as '+z +x +y'"
         )
+        return np.eye(3)
     matrix = np.column_stack([_DIRECTIONS[w] for w in words])
     if not np.isclose(np.linalg.det(matrix), 1.0):
-        raise MotionStyleError(f"{path}: axes of {node} ('{text}') are not a right-handed frame")
+        problems.append(f"axes of {node} ('{text}') are not a right-handed frame")
     return matrix
+
+
+def _load(path: Path) -> dict[str, Any]:
+    """Return the map's sections: mappings, but for `ignored` (a list) and texts.
+
+    Raises
+    ------
+    MotionStyleError
+        If the file is not YAML, or a section is not of its kind.
+    """
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        where = getattr(error, "problem_mark", None)
+        line = f" (line {where.line + 1})" if where is not None else ""
+        raise MotionStyleError(f"{path}: not a YAML file{line}") from error
+    if not isinstance(data, dict):
+        raise MotionStyleError(f"{path}: expected the sections {', '.join(sorted(_KEYS))}")
+    data = {str(key): value for key, value in data.items() if value is not None}
+    kinds = dict.fromkeys(_SECTIONS, dict) | {"ignored": list}
+    wrong = [
+        f"{key} must be a {'list' if kind is list else 'mapping of names'}"
+        for key, kind in kinds.items()
+        if not isinstance(data.get(key, kind()), kind)
+    ]
+    if wrong:
+        raise MotionStyleError(f"{path}: " + "; ".join(wrong))
+    return data
 
 
 def read_skeleton_map(folder: str | Path, name: str) -> SkeletonMap:
@@ -94,34 +126,41 @@ def read_skeleton_map(folder: str | Path, name: str) -> SkeletonMap:
             f"skeleton '{name}' has no file {path}{near_matches(name, known)}; "
             f"known skeletons: {', '.join(known)}"
         )
-    data = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    data = _load(path)
     problems = [f"unknown key '{k}'{near_matches(k, sorted(_KEYS))}" for k in set(data) - _KEYS]
-    joints = data.get("joints") or {}
-    for section, names in (("joints", NODES), ("frames", NODES), ("axes", NODES)):
-        for node in data.get(section) or {}:
-            if node not in names:
-                problems.append(f"{section}: unknown node '{node}'{near_matches(node, names)}")
-    for end in data.get("ends") or {}:
+    joints, frames, ends, axes, offsets_like = (data.get(key, {}) for key in _SECTIONS)
+    for section, nodes in (("joints", joints), ("frames", frames), ("axes", axes)):
+        for node in nodes:
+            if node not in NODES:
+                problems.append(f"{section}: unknown node '{node}'{near_matches(str(node), NODES)}")
+            elif node not in joints:
+                problems.append(f"{section}: node '{node}' is not among the joints")
+    for end in ends:
         if end not in END_NAMES:
-            problems.append(f"ends: unknown end '{end}'{near_matches(end, END_NAMES)}")
+            problems.append(f"ends: unknown end '{end}'{near_matches(str(end), END_NAMES)}")
     problems += [f"joints: node '{n}' is missing" for n in REQUIRED_NODES if n not in joints]
+    problems += [
+        f"joints: node 'toes_{side}' is missing, and ends has no 'foot_front_{side}' instead"
+        for side in "rl"
+        if f"toes_{side}" not in joints and f"foot_front_{side}" not in ends
+    ]
     zero_pose = data.get("zero_pose", "standing")
     if zero_pose not in {"standing", "axes"}:
         problems.append(f"zero_pose is '{zero_pose}', must be standing or axes")
     if zero_pose == "axes":
-        missing = [n for n in joints if n not in (data.get("axes") or {})]
-        problems += [f"axes: node '{n}' is missing" for n in missing]
+        problems += [f"axes: node '{n}' is missing" for n in joints if n not in axes]
+    matrices = {node: _axes(node, text, problems) for node, text in axes.items()}
     if problems:
         raise MotionStyleError(f"{path}: " + "; ".join(sorted(problems)))
     return SkeletonMap(
         name=name,
         joints=joints,
-        frames=data.get("frames") or {},
-        ends=data.get("ends") or {},
-        ignored=tuple(data.get("ignored") or ()),
+        frames=frames,
+        ends=ends,
+        ignored=tuple(data.get("ignored", ())),
         zero_pose=zero_pose,
-        axes={n: _axes(path, n, t) for n, t in (data.get("axes") or {}).items()},
-        offsets_like=data.get("offsets_like") or {},
+        axes=matrices,
+        offsets_like=offsets_like,
     )
 
 
@@ -139,6 +178,7 @@ def check_joints(clip: SkeletonClip, skeleton: SkeletonMap) -> None:
         | set(skeleton.frames.values())
         | set(skeleton.ends.values())
         | set(skeleton.offsets_like)
+        | set(skeleton.offsets_like.values())
     )
     missing = sorted(wanted - set(clip.joints))
     unknown = [
