@@ -253,7 +253,11 @@ def clip_of(
         carrier[node] = len(joints) - 1
     for end, joint in skeleton.ends.items():
         node, place = end_place(end, body)
-        joints.append((joint, node, place, carrier[node]))
+        parent, stem = carrier[node], joint.removesuffix("_end")
+        if joint != stem and stem != joints[parent][0]:  # a bone in between, such as fingers
+            joints.append((stem, node, place / 2, parent))
+            parent = len(joints) - 1
+        joints.append((joint, node, place, parent))
     joints += [(name, "pelvis", np.array([0.0, 0.1, 0.0]), 0) for name in extra]
     names, nodes, places, parents = zip(*joints, strict=True)
     at, parents = np.array([NODE_INDEX[node] for node in nodes]), np.array(parents)
