@@ -1,0 +1,1 @@
+"""Motions as solutions: splines, residual blocks, contact forces, and the physics fit."""
