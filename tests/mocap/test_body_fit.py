@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -254,7 +255,8 @@ def clip_of(
     for end, joint in skeleton.ends.items():
         node, place = end_place(end, body)
         parent, stem = carrier[node], joint.removesuffix("_end")
-        if joint != stem and stem != joints[parent][0]:  # a bone in between, such as fingers
+        ignored = any(fnmatchcase(stem, pattern) for pattern in skeleton.ignored)
+        if joint != stem and ignored:  # a bone in between, such as fingers
             joints.append((stem, node, place / 2, parent))
             parent = len(joints) - 1
         joints.append((joint, node, place, parent))

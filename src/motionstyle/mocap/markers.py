@@ -90,7 +90,8 @@ def place_markers(frames: NodeFrames, body: Body, observed_nodes: set[str]) -> V
         weight = ORIENTATION_WEIGHT.get(node.removesuffix("_r").removesuffix("_l"), 0.0)
         if weight:
             for axis, letter in zip(np.eye(3), "xyz", strict=True):
-                arm = MARKER_ARM * axis
+                outward = -1.0 if letter == "z" and node.endswith("_l") else 1.0
+                arm = outward * MARKER_ARM * axis
                 path = centre + frames.rotations[node] @ arm
                 add(f"{node} {letter}", node, arm, path, weight)
     for side in "rl":

@@ -182,16 +182,23 @@ def fit_legs_to_ground(
     """Refit the legs so that bearing points stay where they bear and none sinks into the ground.
 
     The pelvis and all above it keep their coordinates. The hold on a stance comes and goes, so
-    the legs are filtered once more at 1.5 times the cut-off; toes are then lifted clear.
+    the legs are filtered once more at 1.5 times the cut-off; toes are lifted clear throughout.
     """
     free = np.array([name.rsplit("_", 1)[0] in LEG_COORDINATES for name in COORDINATES])
+    toes = np.array([name.startswith("toes_") for name in COORDINATES])
+
+    def clear(legs: Array) -> Array:
+        """Lift the toes from where the markers put them: a straight tip would push the foot up."""
+        return lift_toes(body, np.where(toes, coordinates, legs), ground)
+
     result = coordinates
     for _ in range(2):
+        result = clear(result)
         points = contact_points(body, forward_kinematics(body, result))
         held = markers.joined(ground_markers(body, points, contacts, ground, rate_hz))
         result = fit_coordinates(body, held, result, free, iterations=5)
-    free |= np.array([name.startswith("toes_") for name in COORDINATES])
-    result = lift_toes(body, result, ground)
+    free |= toes
+    result = clear(result)
     result[:, free] = lowpass(result[:, free], rate_hz, 1.5 * cutoff_hz)
     return result
 
