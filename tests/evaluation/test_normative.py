@@ -153,6 +153,7 @@ def test_a_failed_clip_is_a_row_with_a_reason():
         "dataset": "cmu",
         "config": "full",
         "kind": "captured",
+        "succeeded": "no",
         "status": "failed",
         "reason": "no such joint",
     }

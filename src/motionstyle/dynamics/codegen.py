@@ -56,9 +56,7 @@ def generate_source(functions: Sequence[ca.Function]) -> str:
             generator.add(function)
         generator.generate(folder + os.sep)
         source = (Path(folder) / "functions.c").read_text(encoding="utf-8")
-    drivers = [
-        _DRIVER.format(name=f.name(), n_in=f.n_in(), n_out=f.n_out()) for f in functions
-    ]
+    drivers = [_DRIVER.format(name=f.name(), n_in=f.n_in(), n_out=f.n_out()) for f in functions]
     return source + "".join(drivers)
 
 
@@ -141,9 +139,8 @@ class FrameFunction:
         sizes = [self.function.nnz_in(i) for i in range(self.function.n_in())]
         for i, (array, size) in enumerate(zip(arrays, sizes, strict=True)):
             if array.shape not in {(size,), (frames, size)}:
-                raise ValueError(
-                    f"{self.name}: argument {i} has shape {array.shape}, expected ({frames}, {size})"
-                )
+                wanted = f"({frames}, {size})"
+                raise ValueError(f"{self.name}: argument {i} is {array.shape}, expected {wanted}")
         results = [
             np.zeros((frames, self.function.nnz_out(k))) for k in range(self.function.n_out())
         ]

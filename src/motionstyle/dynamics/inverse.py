@@ -4,19 +4,19 @@ Liu et al. 2005, eqs. (1)–(5), (8), (10), (11). Newton–Euler in world axes a
 position, with a derivation of the Jacobian that costs little more than the forces themselves:
 
 Joint k turns its subtree T(k) about the axis s through the point o. Any small change of how the
-subtree is carried is three vectors (η, β, γ): the change of acceleration at the origin, of angular
-acceleration (with the Coriolis part), and of angular velocity. A body at x with velocity ẋ answers
-with δa = η + β×x + 2γ×ẋ and δα = β + γ×ω, so that a whole subtree answers through five sums: mass M,
-h = Σmx, l = Σmẋ, the inertia Ī, and D (see `_Subtree`):
+subtree is carried is three vectors (η, β, γ): the change of acceleration at the origin, of
+angular acceleration (with the Coriolis part), and of angular velocity. A body at x with velocity
+ẋ answers with δa = η + β×x + 2γ×ẋ and δα = β + γ×ω, so that a whole subtree answers through five
+sums: mass M, h = Σmx, l = Σmẋ, the inertia Ī, and D (see `_Subtree`):
 
     δforce = Mη + β×h + 2γ×l,      δmoment = h×η + Īβ + Dγ.
 
 With b the body before the joint, the rate u of joint k, and a the acceleration of o:
-    ∂/∂angle:   γ = ω_b×s,  β = α_b×s + ω_b×γ,  η = a×s − β×o − 2γ×ȯ,  and the wrench of T(k) turns;
+    ∂/∂angle:   γ = ω_b×s,  β = α_b×s + ω_b×γ,  η = a×s − β×o − 2γ×ȯ,  and T(k)'s wrench turns;
     ∂/∂u:       γ = s,      β = (ω_b + ω_after)×s,  η = −β×o − 2γ×ȯ;
     ∂/∂u̇:       γ = 0,      β = s,  η = −β×o.
-Angles of exponential-map joints are first taken as turns about the child's axes; `_Joints` holds the
-chain rule to coordinates. Contact forces are inputs, fixed in the world.
+Angles of exponential-map joints are first taken as turns about the child's axes; `_Joints` holds
+the chain rule to coordinates. Contact forces are inputs, fixed in the world.
 """
 
 from __future__ import annotations
@@ -54,7 +54,10 @@ class _Turn:
 
 @dataclass
 class _Joints:
-    """Chain rule from coordinates to turns: δφ = g δq, δu = g δq̇ + u_q δq, δu̇ = g δq̈ + …"""
+    """Chain rule from coordinates to turns (δφ, δu, δu̇).
+
+    δφ = g δq, δu = g δq̇ + u_q δq, δu̇ = g δq̈ + d_qd δq̇ + d_q δq.
+    """
 
     g: ca.SX = field(default_factory=lambda: ca.SX(COUNT, COUNT))
     u_q: ca.SX = field(default_factory=lambda: ca.SX(COUNT, COUNT))
@@ -181,9 +184,7 @@ def _motion(
     zero = ca.SX(3, 1)
     for i, (joint, block) in enumerate(zip(JOINTS, JOINT_SLICES, strict=True)):
         if joint.kind == "free":
-            before = _Node(
-                ca.SX.eye(3), zero, zero, qdd[0:3] + ca.SX([0, GRAVITY, 0]), zero, zero
-            )
+            before = _Node(ca.SX.eye(3), zero, zero, qdd[0:3] + ca.SX([0, GRAVITY, 0]), zero, zero)
             joints.g[0:3, 0:3] = ca.SX.eye(3)
             block = slice(3, 6)  # noqa: PLW2901 - the translations are done
         else:
@@ -234,9 +235,7 @@ def _subtrees(
         mass, arm = body.masses[i], node.rotation @ body.coms[i]
         swing = ca.cross(node.spin, arm)
         x, x_dot = node.place + arm, node.velocity + swing
-        acceleration = (
-            node.acceleration + ca.cross(node.rate, arm) + ca.cross(node.spin, swing)
-        )
+        acceleration = node.acceleration + ca.cross(node.rate, arm) + ca.cross(node.spin, swing)
         inertia = _symmetric(node.rotation @ body.inertias[i] @ node.rotation.T)
         carried = inertia @ node.spin
         spin = ca.skew(node.spin)
@@ -246,9 +245,7 @@ def _subtrees(
         shifted = inertia + mass * (ca.trace(outer) * ca.SX.eye(3) - outer)
         d = spin @ inertia - inertia @ spin - ca.skew(carried)
         d += 2 * mass * (ca.dot(x, x_dot) * ca.SX.eye(3) - x_dot @ x.T)
-        trees.append(
-            _Subtree(mass, mass * x, mass * x_dot, _symmetric(shifted), d, force, moment)
-        )
+        trees.append(_Subtree(mass, mass * x, mass * x_dot, _symmetric(shifted), d, force, moment))
     for k, node in enumerate(CONTACT_POINT_NODES):
         y, push = points[k], f[3 * k : 3 * k + 3]
         tree = trees[node]

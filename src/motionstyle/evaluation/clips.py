@@ -41,6 +41,7 @@ CLIP_COLUMNS: tuple[str, ...] = (
     "repaired_frames",
     "leg_length_m",
     "warnings",
+    "succeeded",
     "status",
     "reason",
 )
@@ -74,6 +75,7 @@ def clip_row(motion: Motion, report: Mapping[str, Any], config_name: str) -> dic
         "foot_slip_mm": foot_slip_mm(motion),
         "penetration_mm": penetration_mm(motion),
         "leg_length_m": motion.body.leg_length,
+        "succeeded": "yes",
         "status": "ok",
     }
     return row
@@ -94,6 +96,7 @@ def failed_clip_row(sidecar: Mapping[str, Any], reason: str, config_name: str) -
         "id": sidecar["id"],
         "config": config_name,
         "kind": sidecar.get("kind", "captured"),
+        "succeeded": "no",
         "status": "failed",
         "reason": reason,
     }

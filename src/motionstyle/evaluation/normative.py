@@ -40,6 +40,7 @@ BAND_COLUMNS: tuple[str, ...] = (
     "midpoint_deg",
     "high_deg",
     "inside_band",
+    "has_cycle",
     "cycles",
 )
 GAIT_COLUMNS: tuple[str, ...] = (
@@ -60,6 +61,7 @@ GAIT_COLUMNS: tuple[str, ...] = (
     "double_support_pct",
     "speed_error_pct",
     "within_bands",
+    "has_cycle",
 )
 _ACCEPTANCE = ("step_width_cm", "stance_pct", "double_support_pct", "speed_error_pct")
 
@@ -171,6 +173,7 @@ def band_table(
                     band.midpoint,
                     band.high,
                     inside,
+                    "yes" if len(cycles) else "no",
                     len(cycles),
                 )
                 rows.append(dict(zip(BAND_COLUMNS, values, strict=True)))
@@ -207,5 +210,6 @@ def gait_row(motion: Motion, normative: Normative, config_name: str) -> dict[str
         "cycles": sum(len(gait_cycles(motion, side)) for side in "rl"),
         **numbers,
         "within_bands": "" if np.isnan(banded).any() else ("yes" if within else "no"),
+        "has_cycle": "no" if np.isnan(banded).any() else "yes",
     }
     return {name: row[name] for name in GAIT_COLUMNS}

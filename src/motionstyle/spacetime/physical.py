@@ -2,8 +2,9 @@
 
 Unknowns are the control points of cubic B-splines. Minimised are the distance to virtual markers,
 the joint torques (lightly, to share forces between the feet), slip and sinking of the feet, and
-excess over joint ranges; the root residual of eq. (11) is driven to zero by an augmented Lagrangian,
-and contact forces are eliminated frame by frame. Damped Gauss–Newton on banded normal equations.
+excess over joint ranges; the root residual of eq. (11) is driven to zero by an augmented
+Lagrangian, and contact forces are eliminated frame by frame. Damped Gauss–Newton on banded
+normal equations.
 """
 
 from __future__ import annotations
@@ -134,7 +135,7 @@ def fit_physical(
             if fall < settings.tolerance:
                 break
         rms = float(np.sqrt((state.root[:, :3] ** 2).sum(axis=1).mean()))
-        log(f"outer {outer}: cost {state.cost:.4f}, root force {rms:.3f} N rms, damping {damping:.1e}")
+        log(f"outer {outer}: cost {state.cost:.4f}, root force {rms:.3f} N rms")
         if rms < settings.root_goal_n:
             status = "ok"
             break
@@ -271,7 +272,9 @@ def _step(
     settings, basis = problem.settings, problem.basis
     q, qd, qdd = basis.evaluate(controls)
     frames = len(q)
-    values = problem.slopes(q, qd, qdd, state.contact_forces.reshape(frames, 24), problem.parameters)
+    values = problem.slopes(
+        q, qd, qdd, state.contact_forces.reshape(frames, 24), problem.parameters
+    )
     blocks = [_dense(values[k + 1], problem.patterns[k], (COUNT, COUNT)) for k in range(3)]
     jacobian = np.concatenate(blocks, axis=2) * _scale(problem)[:, None]
     weighted = state.solved.weights @ jacobian
