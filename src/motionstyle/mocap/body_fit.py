@@ -166,7 +166,7 @@ def find_sole(
             rate_hz,
         )
         if flat.any():  # of those, the frames with the lowest heel
-            flat &= ankle[:, 1] <= np.quantile(ankle[flat, 1], 0.5) + 1e-4
+            flat &= ankle[:, 1] <= np.quantile(ankle[flat, 1], 0.5) + 1e-9
     forward = np.array([1.0, 0.0, 0.0])
     if front is not None:
         forward = _in_frame(rotation, ankle, front)
