@@ -33,7 +33,7 @@ RAW = {
     "name": "test",
     "results_root": "results",
     "motions": "config/motions.tsv",
-    **{group: SHIPPED[group] for group in ("retarget", "contacts", "figures")},
+    **{group: SHIPPED[group] for group in ("retarget", "contacts", "physical", "figures")},
 }
 
 

@@ -52,7 +52,7 @@ def to_pinocchio(q, qd, qdd):
             rate += list(qd[:3])
             second += list(qdd[:3])
             g[:3, :3] = np.eye(3)
-            block = slice(3, 6)
+            block = slice(3, 6)  # noqa: PLW2901 - the translations are done
         if joint.kind in {"free", "exponential"}:
             basis = np.array(joint.axes)[-3:].T
             v, vd, vdd = (basis @ x[block] for x in (q, qd, qdd))

@@ -10,6 +10,7 @@ from snakemake.exceptions import WorkflowError
 import motionstyle
 from motionstyle.configuration import load_config
 from motionstyle.errors import MotionStyleError
+from motionstyle.jobs import forget_killed_runs
 from motionstyle.mocap.doors import read_datasets
 from motionstyle.mocap.planted import read_planted
 from motionstyle.mocap.sheet import EMBEDDED, read_sheet
@@ -21,16 +22,17 @@ PATH_KEYS = ("motions", "datasets", "embedded", "claims", "skeletons", "planted"
 
 
 def located(path):
-    """Return a path of the configuration: as given from here if it is there, else in the clone."""
-    here = Path(path)
-    return here if here.is_absolute() or here.exists() else ROOT / path
+    """Return a path of the configuration: from here if it is there, else in the clone."""
+    return ROOT / path if not Path(path).exists() and (ROOT / path).exists() else Path(path)
 
 
 try:
+    # `--config key=true` arrives as text.
+    config.update({k: v == "true" for k, v in config.items() if v in ("true", "false")})
     for key in PATH_KEYS:
         if isinstance(config.get(key), str):
             config[key] = str(located(config[key]))
-    CONFIG = load_config(config, ROOT / "workflow/schemas/config.schema.json", ROOT)
+    CONFIG = load_config(config, ROOT / "workflow/schemas/config.schema.json", Path.cwd())
     DATASETS = read_datasets(CONFIG["datasets"])
     WHEEL = read_wheel_pin(CONFIG["embedded"])
     SKELETONS = Path(CONFIG["skeletons"])
@@ -52,12 +54,17 @@ try:
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
 
+# Kept open while this run lasts: a run that was killed leaves locks, which the next one removes.
+ALIVE = forget_killed_runs(".snakemake") if workflow.is_main_process else None
+
 RESULTS = Path(CONFIG["results_root"])
 LOGS = RESULTS / "logs"
 BENCHMARKS = RESULTS / "benchmarks"
 SOURCES = RESULTS / "sources"
 MOTIONS = RESULTS / "motions"
 MIRRORED = [f"{id}_mirror" for id, row in CLIPS.items() if row.mirror]
+# Clips that are made to obey Newton.
+PHYSICAL = [id for id, row in CLIPS.items() if row.level == "physical" or "nio" in row.experiments]
 
 
 wildcard_constraints:
@@ -105,11 +112,15 @@ def skeleton_files(row):
 def motion_files():
     """Return the files of every motion of this run."""
     captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
+    captured += [MOTIONS / "captured" / f"{id}_physical.npz" for id in PHYSICAL]
     return captured + [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
-TABLES = [RESULTS / f"tables/{name}.csv" for name in ("clips", "motions", "gait_angles", "gait")]
+TABLES = [
+    RESULTS / f"tables/{name}.csv"
+    for name in ("body", "clips", "motions", "gait_angles", "gait", "physical")
+]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {

@@ -3,10 +3,11 @@
 
 rule figure_body:
     input:
-        motion=MOTIONS / "captured" / f"{SHOWN['body'][0]}.npz",
+        motions=[MOTIONS / f"captured/{id}.npz" for id in SHOWN["body"]],
     output:
         svg=RESULTS / "figures/body.svg",
         png=RESULTS / "figures/body.png",
+        table=RESULTS / "tables/body.csv",
     log:
         LOGS / "figures/body.log",
     conda:
@@ -15,7 +16,8 @@ rule figure_body:
     resources:
         mem_mb=1000,
     params:
-        library=library("body", "motion", "figures"),
+        library=library("body", "motion", "evaluation", "figures"),
+        config=CONFIG["name"],
     script:
         "../scripts/figure_body.py"
 
@@ -87,7 +89,7 @@ rule figure_markers:
     resources:
         mem_mb=1000,
     params:
-        library=library("figures"),
+        library=library("body", "motion", "evaluation", "figures"),
     script:
         "../scripts/figure_markers.py"
 
@@ -114,6 +116,7 @@ rule report:
     params:
         library=library("evaluation", "report"),
         config=CONFIG["name"],
+        data=CONFIG["name"] if all(row.dataset for row in CLIPS.values()) else "own",
     script:
         "../scripts/report.py"
 
@@ -140,7 +143,8 @@ rule check_clips:
 rule publish:
     input:
         tables=[
-            RESULTS / f"tables/{name}.csv" for name in ("clips", "gait_angles", "gait", "claims")
+            RESULTS / f"tables/{name}.csv"
+            for name in ("body", "clips", "gait_angles", "gait", "claims")
         ],
         figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],
         stamp=RESULTS / "status/clips.ok",

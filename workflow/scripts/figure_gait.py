@@ -4,14 +4,12 @@ from pathlib import Path
 
 from motionstyle.evaluation.normative import read_normative
 from motionstyle.figures.gait import gait_figure
-from motionstyle.figures.style import save
+from motionstyle.figures.style import blank_figure, save
 from motionstyle.jobs import job
 from motionstyle.motion.storage import load_available
 
 with job(snakemake.log[0]):
-    save(
-        gait_figure(
-            load_available(snakemake.input.motions), read_normative(snakemake.input.normative)
-        ),
-        Path(snakemake.output.svg).with_suffix(""),
-    )
+    motions = load_available(snakemake.input.motions, allow_none=True)
+    normative = read_normative(snakemake.input.normative)
+    figure = gait_figure(motions, normative) if motions else blank_figure("no motion to show")
+    save(figure, Path(snakemake.output.svg).with_suffix(""))

@@ -13,7 +13,7 @@ from motionstyle.motion.storage import load_available
 from motionstyle.tables import write_table
 
 with job(snakemake.log[0]):
-    motions = load_available(snakemake.input.motions)
+    motions = load_available(snakemake.input.motions, allow_none=True)
     normative, config = read_normative(snakemake.input.normative), snakemake.params.config
     rows = [gait_row(motion, normative, config) for motion in motions]
     walks = [motion for motion in motions if is_level_walk(motion, normative)]

@@ -17,6 +17,6 @@ with job(snakemake.log[0]):
         evaluate_claims(claims, results),
         results_root=str(results),
         config_name=snakemake.params.config,
-        data_kind=captions["data"].get(snakemake.params.config, captions["data"]["own"]),
+        data_kind=captions["data"].get(snakemake.params.data, captions["data"]["own"]),
         figures=[(f, captions["figures"][Path(f).stem]) for f in snakemake.input.figures],
     )

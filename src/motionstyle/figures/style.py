@@ -89,6 +89,13 @@ def save(figure: Figure, stem: str | Path) -> tuple[Path, Path]:
     return svg, png
 
 
+def blank_figure(text: str) -> Figure:
+    """Return a figure that says why there is nothing to draw."""
+    figure = new_figure(1.0)
+    figure.text(0.5, 0.5, text, ha="center", va="center")
+    return figure
+
+
 def motion_title(motion: Motion, title: str | None = None) -> str:
     """Return a motion's title, by default its id; those of planted motions say so."""
     text = motion.id if title is None else title

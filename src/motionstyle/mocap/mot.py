@@ -170,9 +170,7 @@ def forces_from_mot(
         )
 
     force = read("force", 1.0)
-    centre = np.where(
-        np.abs(force[..., 1:2]) > LOADED_N, read("point", scale), np.nan
-    )
+    centre = np.where(np.abs(force[..., 1:2]) > LOADED_N, read("point", scale), np.nan)
     steps = np.diff(table.times)
     step = (table.times[-1] - table.times[0]) / len(steps)
     if np.abs(steps - step).max() > 0.5 * step:

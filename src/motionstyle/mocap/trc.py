@@ -130,9 +130,7 @@ def _frames(
             continue
         cells = [cell.strip() for cell in line.split("\t")]
         if any(cells[width:]):
-            problems.add(
-                number, f"{len(cells)} cells, expected {width} (frame, time, 3 a marker)"
-            )
+            problems.add(number, f"{len(cells)} cells, expected {width} (frame, time, 3 a marker)")
             continue
         cells = cells[:width]
         if len(cells) < width:

@@ -228,10 +228,11 @@ def _save_npz(path: str | Path, arrays: dict[str, Any]) -> None:
                 np.lib.format.write_array(member, values, allow_pickle=False)
 
 
-def load_available(paths: Iterable[str | Path]) -> list[Motion]:
-    """Read the motions that could be made, and print which could not; at least one must be there.
+def load_available(paths: Iterable[str | Path], *, allow_none: bool = False) -> list[Motion]:
+    """Read the motions that could be made, and print which could not.
 
-    The failed ones keep their row, with the reason, in the tables of their stage.
+    The failed ones keep their row, with the reason, in the tables of their stage. At least one
+    must be there, unless `allow_none`.
 
     Raises
     ------
@@ -246,6 +247,6 @@ def load_available(paths: Iterable[str | Path]) -> list[Motion]:
             failed.append(Path(path).stem)
     if failed:
         print(f"left out, failed before: {', '.join(failed)}")
-    if failed and not found:
+    if failed and not found and not allow_none:
         raise MotionStyleError(f"none of these motions is available: {', '.join(failed)}")
     return found

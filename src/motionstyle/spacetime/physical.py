@@ -9,8 +9,9 @@ normal equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from motionstyle.dynamics.inverse import GRAVITY
 from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
+from motionstyle.motion.resample import resample
 from motionstyle.spacetime.forces import Eliminated, cone_basis, eliminate_forces
 from motionstyle.spacetime.splines import BandedSystem, SplineBasis
 
@@ -64,12 +66,24 @@ class PhysicalSettings:
 class PhysicalFit:
     """A physical motion and how well it obeys.
 
-    report : marker_rms_cm, root_force_rms_n, root_moment_rms_nm, root_force_rms_pctbw, slip_mm,
-    penetration_mm, status, iterations.
+    report : the columns of `evaluation.physical.PHYSICAL_COLUMNS` but for the configuration.
     """
 
     motion: Motion
     report: dict[str, float | int | str]
+
+
+def settings_from(config: Mapping[str, float]) -> PhysicalSettings:
+    """Return settings from the section `physical` of the configuration."""
+    names = {field.name for field in fields(PhysicalSettings)}
+    return PhysicalSettings(**{k: v for k, v in config.items() if k in names})
+
+
+def prepare(motion: Motion, config: Mapping[str, float]) -> Motion:
+    """Return the motion at the fit's rate, cut to its middle `longest_s` seconds."""
+    slow = resample(motion, config["rate_hz"])
+    extra = slow.frames - round(config["longest_s"] * config["rate_hz"])
+    return slow.window(extra // 2, slow.frames - 1 - (extra - extra // 2)) if extra > 0 else slow
 
 
 @dataclass
@@ -122,6 +136,7 @@ def fit_physical(
     MotionStyleError
         If the motion is too short for splines.
     """
+    started = perf_counter()
     problem = _set_up(motion, functions, settings)
     controls = problem.basis.fit(motion.coordinates)
     damping, iterations, status = 1e-3, 0, "iteration limit"
@@ -143,7 +158,8 @@ def fit_physical(
         multiplier = (problem.shift + state.root) / problem.root_n**2
         problem.root_n, problem.shift = tighter, multiplier * tighter**2
         state = _evaluate(problem, controls)
-    return _result(problem, state, status, iterations)
+    seconds = perf_counter() - started
+    return _result(problem, state, {"status": status, "iterations": iterations, "seconds": seconds})
 
 
 def _set_up(
@@ -312,7 +328,7 @@ def _step(
     return controls, state, damping
 
 
-def _result(problem: _Problem, state: _State, status: str, iterations: int) -> PhysicalFit:
+def _result(problem: _Problem, state: _State, solver: dict[str, float | int | str]) -> PhysicalFit:
     motion, q = problem.motion, state.coordinates
     weight = motion.body.mass * GRAVITY
     misses, _foot, _weights, _excess = _kinematic_terms(problem, q)
@@ -321,6 +337,7 @@ def _result(problem: _Problem, state: _State, status: str, iterations: int) -> P
     moment = float(np.sqrt((state.root[:, 3:] ** 2).sum(axis=1).mean()))
     bearing = problem.foot_weights[..., 0] > 0
     away = np.linalg.norm((points - problem.feet)[..., [0, 2]], axis=-1)[bearing]
+    vertical = state.contact_forces[..., 1].sum(axis=1)
     report: dict[str, float | int | str] = {
         "marker_rms_cm": 100 * float(np.sqrt((misses**2).sum(axis=-1).mean())),
         "root_force_rms_n": force,
@@ -328,11 +345,22 @@ def _result(problem: _Problem, state: _State, status: str, iterations: int) -> P
         "root_force_rms_pctbw": 100 * force / weight,
         "slip_mm": 1000 * float(np.sqrt((away**2).mean())) if len(away) else 0.0,
         "penetration_mm": 1000 * max(0.0, -float(points[..., 1].min())),
-        "status": status,
-        "iterations": iterations,
+        "vertical_mean_bw": float(vertical.mean()) / weight,
+        "vertical_peak_bw": float(vertical.max()) / weight,
+        "frames": motion.frames,
+        "rate_hz": motion.rate_hz,
+        "mass_kg": motion.body.mass,
+        "mass_source": motion.body.mass_source,
+        "dataset": str(motion.provenance.get("dataset", "")),
+        "action": str(motion.provenance.get("action", "")),
+        **solver,
     }
-    provenance = {**motion.provenance, "level": "physical"}
+    provenance = {**motion.provenance, "level": "physical", "example": motion.id}
     fitted = replace(
-        motion, coordinates=q, contact_forces=state.contact_forces, provenance=provenance
+        motion,
+        id=f"{motion.id}_physical",
+        coordinates=q,
+        contact_forces=state.contact_forces,
+        provenance=provenance,
     )
     return PhysicalFit(fitted, report)

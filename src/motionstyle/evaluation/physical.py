@@ -1,0 +1,19 @@
+"""The table of physical motions: how near their markers, and how well they obey Newton."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+PHYSICAL_COLUMNS = (
+    *("id", "dataset", "config", "action", "frames", "rate_hz", "mass_kg", "mass_source"),
+    *("marker_rms_cm", "root_force_rms_n", "root_moment_rms_nm", "root_force_rms_pctbw"),
+    *("slip_mm", "penetration_mm", "vertical_mean_bw", "vertical_peak_bw"),
+    *("iterations", "seconds", "status", "reason"),
+)
+
+
+def physical_row(report: Mapping[str, Any], config_name: str) -> dict[str, object]:
+    """Return a motion's row with `PHYSICAL_COLUMNS` from the report of its fit."""
+    row: dict[str, object] = {name: report.get(name, "") for name in PHYSICAL_COLUMNS}
+    return row | {"config": config_name}

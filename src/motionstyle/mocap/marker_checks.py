@@ -1,0 +1,120 @@
+"""Checks of a marker clip against the human body: its unit, and right and left."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionstyle.errors import MotionStyleError
+from motionstyle.mocap.marker_clip import MarkerClip
+from motionstyle.mocap.marker_joints import pelvis_frame
+from motionstyle.mocap.markerset import LANDMARKS, Assigned
+from motionstyle.mocap.sheet import METRES
+
+Array = NDArray[np.float64]
+PELVIS_WIDTH_M = (0.15, 0.42)  # between the ASIS of anyone older than a small child
+SWAPPED_M = 0.02  # a pair is swapped if its right marker lies this far to the left of the left one
+HANGING = 0.5  # least cosine between the vertical and the line from feet to pelvis
+
+
+def check_size(clip: MarkerClip, assigned: Assigned) -> None:
+    """Refuse a clip whose pelvis is no human's size, and say which unit would make it one.
+
+    Raises
+    ------
+    MotionStyleError
+        If the ASIS markers are less than 15 or more than 42 cm apart.
+    """
+    apart = clip.path(assigned.landmarks["asis_r"]) - clip.path(assigned.landmarks["asis_l"])
+    width = float(np.nanmedian(np.linalg.norm(apart, axis=1)))
+    low, high = PELVIS_WIDTH_M
+    if low <= width <= high:
+        return
+    now = METRES.get(clip.unit, 1.0)
+    fitting = [
+        unit
+        for unit, metres in METRES.items()
+        if unit != "cmu" and low <= width / now * metres <= high
+    ]
+    suggestion = f"; is the unit {' or '.join(fitting)}?" if fitting else ""
+    raise MotionStyleError(
+        f"{clip.source}: the ASIS markers are {width:.4g} m apart (file read in "
+        f"{clip.unit}), expected {low} to {high} m{suggestion} Set the column unit of the sheet"
+    )
+
+
+def check_upright(clip: MarkerClip, assigned: Assigned) -> None:
+    """Refuse a clip in which the pelvis is not above the heels: its vertical axis is wrong.
+
+    Raises
+    ------
+    MotionStyleError
+        If the line from heels to pelvis is more than 60° off the vertical on the median.
+    """
+    found = assigned.landmarks
+    pelvis = (clip.path(found["asis_r"]) + clip.path(found["asis_l"])) / 2
+    heels = (clip.path(found["heel_r"]) + clip.path(found["heel_l"])) / 2
+    line = np.nanmedian(pelvis - heels, axis=0)
+    line /= np.linalg.norm(line)
+    if line[1] < HANGING:
+        axis = "xyz"[int(np.argmax(np.abs(line)))]
+        raise MotionStyleError(
+            f"{clip.source}: the pelvis is not above the heels ({line[1]:.2f} of the line between "
+            f"them is vertical, expected more than {HANGING}); the long axis is {axis} "
+            "(after turning the file's up axis to y): check the column up_axis of the sheet"
+        )
+
+
+def check_sides(clip: MarkerClip, assigned: Assigned) -> None:
+    """Refuse a clip in which right markers lie to the left of their left partners.
+
+    Anatomical forward is from the back of the pelvis to its front, and right follows from it.
+
+    Raises
+    ------
+    MotionStyleError
+        Naming every swapped pair.
+    """
+    points = {name: clip.path(label) for name, label in assigned.landmarks.items()}
+    front = (points["asis_r"] + points["asis_l"]) / 2
+    back = points.get("sacrum")
+    if back is None:
+        back = (points["psis_r"] + points["psis_l"]) / 2
+    forward = (front - back) * [1, 0, 1]
+    right = np.cross(forward, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    swapped = []
+    for landmark in LANDMARKS:
+        other = landmark[:-1] + "l"
+        if not landmark.endswith("_r") or landmark not in points or other not in points:
+            continue
+        offset = ((points[landmark] - points[other]) * right).sum(axis=1)
+        if np.isfinite(offset).any() and np.nanmedian(offset) < -SWAPPED_M:
+            one, two = assigned.landmarks[landmark], assigned.landmarks[other]
+            swapped.append(f"'{one}' lies {-100 * np.nanmedian(offset):.0f} cm left of '{two}'")
+    if swapped:
+        raise MotionStyleError(
+            f"{clip.source}: right and left are swapped: {'; '.join(swapped)} "
+            "(right of the direction from the back of the pelvis to its front); exchange the "
+            "labels in the file, or in the marker set"
+        )
+
+
+def check_clip_of_person(clip: MarkerClip, assigned: Assigned) -> None:
+    """Run all checks of a clip in metres with y up."""
+    check_size(clip, assigned)
+    check_upright(clip, assigned)
+    check_sides(clip, assigned)
+
+
+def heading(clip: MarkerClip, assigned: Assigned) -> Array:
+    """Return the horizontal unit vector the pelvis faces in its first complete frame, (3,)."""
+    points = {name: clip.path(label) for name, label in assigned.landmarks.items()}
+    axes = pelvis_frame(points)
+    seen = np.flatnonzero(np.isfinite(axes).all(axis=(1, 2)))
+    if not len(seen):
+        raise MotionStyleError(
+            f"{clip.source}: the pelvis' markers are never seen together; expected at least a frame"
+        )
+    right = axes[seen[0], :, 2] * [1, 0, 1]
+    return np.cross([0.0, 1.0, 0.0], right / np.linalg.norm(right))
