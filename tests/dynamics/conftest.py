@@ -16,4 +16,6 @@ def functions():
 def states():
     """Five random states: q, q̇, q̈ (5, 35) and contact forces (5, 24)."""
     rng = np.random.default_rng(7)
-    return [rng.standard_normal((5, n)) * size for n, size in ((35, 0.6), (35, 2), (35, 9), (24, 150))]
+    return [
+        rng.standard_normal((5, n)) * size for n, size in ((35, 0.6), (35, 2), (35, 9), (24, 150))
+    ]

@@ -23,4 +23,5 @@ with job(snakemake.log[0]):
         write_json(output.report, {"id": id, "status": "failed", "reason": str(error)})
     else:
         save_motion(output.motion, found.motion)
-        write_json(output.report, {"id": id, **found.report})
+        used = "nio" in motion.provenance["experiments"]
+        write_json(output.report, {"id": id, "used_by_nio": used, **found.report})

@@ -8,7 +8,8 @@ from typing import Any
 PHYSICAL_COLUMNS = (
     *("id", "dataset", "config", "action", "frames", "rate_hz", "mass_kg", "mass_source"),
     *("marker_rms_cm", "root_force_rms_n", "root_moment_rms_nm", "root_force_rms_pctbw"),
-    *("slip_mm", "penetration_mm", "vertical_mean_bw", "vertical_peak_bw"),
+    *("root_share_of_E_pct", "foot_slip_mm", "penetration_mm"),
+    *("vertical_mean_bw", "vertical_peak_bw", "markers", "used_by_nio"),
     *("iterations", "seconds", "status", "reason"),
 )
 
