@@ -14,15 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.body.anthropometry import Sex
-from motionstyle.body.body import Body, build_body
+from motionstyle.body.body import build_body
 from motionstyle.body.kinematics import contact_points, forward_kinematics
-from motionstyle.body.layout import COORDINATE_INDEX, COORDINATE_NODE, COORDINATES, NODE_INDEX, NODES
-from motionstyle.body.rotations import logarithm
 from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.c3d import read_c3d, read_c3d_forces
 from motionstyle.mocap.contacts import detect_contacts, ground_height
 from motionstyle.mocap.ingest import FEWEST_FRAMES, Ingested, provenance
-from motionstyle.mocap.marker_body import MarkerBody, measure_markers
+from motionstyle.mocap.marker_body import measure_markers
 from motionstyle.mocap.marker_checks import check_clip_of_person, heading
 from motionstyle.mocap.marker_clip import (
     ForceRecord,
@@ -31,12 +29,18 @@ from motionstyle.mocap.marker_clip import (
     upright,
     upright_forces,
 )
-from motionstyle.mocap.marker_joints import hip_centres, pelvis_frame
-from motionstyle.mocap.marker_paths import Placement, belt_velocity, fill_gaps, smooth_paths
-from motionstyle.mocap.markers import VirtualMarkers, marker_distances
+from motionstyle.mocap.marker_fit import (
+    fit_markers,
+    marker_targets,
+    observed_coordinates,
+    start_coordinates,
+)
+from motionstyle.mocap.marker_joints import hip_centres
+from motionstyle.mocap.marker_paths import Placement, belt_velocity
+from motionstyle.mocap.markers import marker_distances
 from motionstyle.mocap.markerset import Assigned, MarkerSet, assign_labels, read_marker_set
 from motionstyle.mocap.mot import check_signs, forces_from_mot, read_mot
-from motionstyle.mocap.retarget import fit_coordinates, fit_legs_to_ground, make_continuous
+from motionstyle.mocap.retarget import fit_legs_to_ground, make_continuous
 from motionstyle.mocap.settings import RetargetSettings, by_action
 from motionstyle.mocap.sheet import ClipRow
 from motionstyle.mocap.trc import UNITS, read_trc
@@ -44,12 +48,8 @@ from motionstyle.motion.motion import Motion
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])
-# What a marker weighs: on bone 1, on muscle or a limb the body cannot turn with, less.
-CLUSTER_WEIGHT = 0.5
-LANDMARK_WEIGHT = {"acromion": 0.5, "wrist_radius": 0.5, "wrist_ulna": 0.5, "finger": 0.2}
-# How many markers show a node, at least; arms and legs need fewer as their joints add the rest.
-ENOUGH = {"thorax": 3, "head": 3}
-STANDS_LOW_M = 0.03  # a foot within this of a plate or stair is taken to stand on it
+# A point this far beside a plate still stands on it, and so does one this far below its surface.
+BESIDE_PLATE_M, BELOW_PLATE_M = 0.02, 0.06
 
 
 def read_markers(row: ClipRow, path: str | Path, markers: MarkerSet) -> MarkerClip:
@@ -148,15 +148,14 @@ def ingest_markers(
     body = build_body(person.geometry, mass, sex, mass_source=source)
     cutoff = by_action(settings.cutoff_hz, row.action)
     observed = observed_coordinates(assigned)
-    paths, virtual, seen = _targets(clip, assigned, person, cutoff)
-    coordinates = _start(clip, assigned, person, observed)
-    for iterations in (60, 30):  # the second time with offsets as the clip itself shows them
-        coordinates = fit_coordinates(body, virtual, coordinates, observed, iterations=iterations)
-        virtual = _with_offsets(body, virtual, coordinates, seen)
-    coordinates = fit_coordinates(body, virtual, coordinates, observed, iterations=30)
+    paths, virtual, seen = marker_targets(clip, assigned, person, cutoff)
+    start = start_coordinates(clip, assigned, person, observed)
+    coordinates, virtual = fit_markers(body, virtual, seen, start, observed)
     level = row.surface == "level"
     points = contact_points(body, forward_kinematics(body, coordinates))
     ground = ground_height(points, clip.rate_hz, level=level)
+    if record is not None and not level:
+        ground = _plate_height(points, record, ground)
     contacts = detect_contacts(points, clip.rate_hz, thresholds, ground)
     coordinates = fit_legs_to_ground(
         body, virtual, coordinates, contacts, ground, clip.rate_hz, cutoff
@@ -210,22 +209,6 @@ def placed_forces(motion: Motion, path: str | Path, markers: MarkerSet) -> Force
     return Placement.from_json(placement).forces(read_forces(path, markers))
 
 
-def observed_coordinates(assigned: Assigned) -> NDArray[np.bool_]:
-    """Return which of the 35 coordinates the markers show.
-
-    Trunk and head need three markers of their own, other nodes one (legs and arms are chains);
-    an upper arm needs a marker beyond its shoulder, and the abdomen is seen through the thorax.
-    """
-    count = {node: list(assigned.nodes.values()).count(node) for node in NODES}
-    count["abdomen"] = count["thorax"]
-    for side in "rl":
-        count[f"upper_arm_{side}"] += count[f"forearm_{side}"]
-        if count["thorax"] < ENOUGH["thorax"]:
-            count[f"upper_arm_{side}"] = count[f"forearm_{side}"] = 0
-    shown = {n for n in NODES if count[n] >= ENOUGH.get(n.replace("abdomen", "thorax"), 1)}
-    return np.array([NODES[node] in shown for node in COORDINATE_NODE])
-
-
 def _windowed(clip: MarkerClip, row: ClipRow) -> MarkerClip:
     first = row.first_frame or 0
     last = clip.frames - 1 if row.last_frame is None else row.last_frame
@@ -255,72 +238,25 @@ def _support(clip: MarkerClip, assigned: Assigned, record: ForceRecord) -> Array
     """Return the height of the plate under the lower foot per frame, (F,), or None off plates."""
     if record.corners is None:
         return None
-    low, high = record.corners.min(axis=1), record.corners.max(axis=1)
-    height = np.zeros(clip.frames)
     feet = []
     for side in "rl":
         labels = [assigned.landmarks.get(f"{n}_{side}") for n in ("heel", "toe", "mtp_lateral")]
         feet.append(np.mean([clip.path(x) for x in labels if x is not None], axis=0))
     lower = np.where((feet[0][:, 1] < feet[1][:, 1])[:, None], feet[0], feet[1])
-    for a, b in zip(low, high, strict=True):
-        over = ((lower > a - STANDS_LOW_M) & (lower < b + STANDS_LOW_M))[:, [0, 2]].all(axis=1)
-        height = np.where(over, np.maximum(height, b[1]), height)
-    return height
+    return _plate_height(lower[:, None], record, np.zeros((clip.frames, 1)))[:, 0]
 
 
-def _targets(
-    clip: MarkerClip, assigned: Assigned, person: MarkerBody, cutoff: float
-) -> tuple[Array, VirtualMarkers, NDArray[np.bool_]]:
-    """Return raw paths, markers with smooth paths and weights, and where they were seen."""
-    labels = tuple(assigned.nodes)
-    paths, weights, seen = fill_gaps(clip, labels)
-    role = {label: landmark.rsplit("_", 1)[0] for landmark, label in assigned.landmarks.items()}
-    weigh = [LANDMARK_WEIGHT.get(role[x], 1.0) if x in role else CLUSTER_WEIGHT for x in labels]
-    placed = np.array([label in person.offsets for label in labels])
-    weights = weights * np.array(weigh) * placed
-    virtual = VirtualMarkers(
-        names=labels,
-        nodes=np.array([NODE_INDEX[assigned.nodes[label]] for label in labels]),
-        local=np.array([person.offsets.get(label, np.zeros(3)) for label in labels]),
-        world=smooth_paths(paths, seen, clip.rate_hz, cutoff),
-        weights=np.repeat(weights[..., None], 3, axis=2),
-    )
-    return paths, virtual, seen
-
-
-def _start(
-    clip: MarkerClip, assigned: Assigned, person: MarkerBody, observed: NDArray[np.bool_]
-) -> Array:
-    """Return coordinates (F, 35) that follow the pelvis, with all joints straight.
-
-    A trunk that no marker shows stays upright against the mean tilt of the pelvis.
-    """
-    labels = tuple(assigned.nodes)
-    paths, _, _ = fill_gaps(clip, labels)
-    points = {n: paths[:, labels.index(label)] for n, label in assigned.landmarks.items()}
-    start = np.zeros((clip.frames, len(COORDINATES)))
-    start[:, :3] = sum(hip_centres(points).values()) / 2
-    start[:, 3:6] = logarithm(pelvis_frame(points))
-    flexion = COORDINATE_INDEX["abdomen_flexion"]
-    if not observed[flexion]:
-        start[:, flexion] = -person.pelvis_pitch
-    return make_continuous(start)[0]
-
-
-def _with_offsets(
-    body: Body, virtual: VirtualMarkers, coordinates: Array, seen: NDArray[np.bool_]
-) -> VirtualMarkers:
-    """Return the markers moved on their nodes to where the fitted clip shows them on average.
-
-    A marker that the calibration did not place gets its place and its weight here.
-    """
-    pose = forward_kinematics(body, coordinates)
-    away = virtual.world - pose.positions[:, virtual.nodes]
-    local = np.einsum("fmba,fmb->fma", pose.rotations[:, virtual.nodes], away)
-    local[~seen] = np.nan
-    new = virtual.weights.sum(axis=(0, 2)) == 0
-    weights = np.where(new[:, None], CLUSTER_WEIGHT * seen[..., None], virtual.weights)
-    return replace(virtual, local=np.nanmedian(local, axis=0), weights=weights)
+def _plate_height(points: Array, record: ForceRecord, elsewhere: Array) -> Array:
+    """Return the height of the highest plate below points (F, P, 3), or `elsewhere` (F, P), m."""
+    if record.corners is None:
+        return elsewhere
+    height = np.full(points.shape[:2], -np.inf)
+    for corners in record.corners:
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        inside = (points >= low - BESIDE_PLATE_M) & (points <= high + BESIDE_PLATE_M)
+        over = inside[..., 0] & inside[..., 2] & (points[..., 1] > high[1] - BELOW_PLATE_M)
+        height = np.where(over, np.maximum(height, high[1]), height)
+    return np.where(np.isfinite(height), height, elsewhere)
 
 
 def _remarks(clip: MarkerClip, names: tuple[str, ...], seen: NDArray[np.bool_]) -> str:

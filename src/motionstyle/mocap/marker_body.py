@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.body.anthropometry import REFERENCE_LENGTHS, TRUNK_LENGTHS, Sex
+from motionstyle.body.anthropometry import (
+    BALL_FRACTION,
+    REFERENCE_LENGTHS,
+    TRUNK_LENGTHS,
+    Sex,
+)
 from motionstyle.body.body import BodyGeometry
+from motionstyle.body.layout import CONTACT_POINTS, NODE_INDEX
 from motionstyle.body.rotations import exponential
 from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.body_fit import NodeFrames, foot_length, measure_body
@@ -34,6 +40,7 @@ FEWEST_FRAMES = 3
 NECK_AHEAD_OF_C7, NECK_ABOVE_ACROMIA = 0.05, 0.03
 BALL_INWARD, BALL_AHEAD = 0.17, 0.04  # of foot length
 MARKER_ABOVE_BALL = 0.015  # m, of a marker on top of or beside a metatarsal head
+MARKER_BEHIND_HEEL, SHORTEST_HEEL = 0.01, 0.02  # m, of a marker's centre; and behind the ankle
 SHOULDER_HALF_WIDTH = 0.18  # m on a leg of 0.86 m
 ARM_OF_LEG = {"upper_arm": 0.2817 / 0.8625, "forearm": 0.2689 / 0.8625}  # de Leva, male
 
@@ -98,6 +105,7 @@ def measure_markers(
     positions = clip.positions[whole] - shift[:, None]
     frames = _node_frames(points, positions, clip, assigned, sex)
     geometry, frames = measure_body(frames, sex, clip.rate_hz, thresholds)
+    geometry = _measured_feet(geometry, frames, points)
     offsets = {}
     for label, node in assigned.nodes.items():
         away = positions[:, clip.labels.index(label)] - frames.positions[node]
@@ -202,6 +210,29 @@ def _foot(
         ball = (top if top is not None else inner) - MARKER_ABOVE_BALL * up
     position[f"toes_{side}"] = ball
     rotation[f"foot_{side}"] = rotation[f"toes_{side}"] = frame(forward, up, right)
+
+
+def _measured_feet(
+    geometry: BodyGeometry, frames: NodeFrames, points: dict[str, Array]
+) -> BodyGeometry:
+    """Return the geometry with heels and toes where their markers show them.
+
+    Without a marker at its tip, a foot is as long as its ball lies at the usual fraction of it.
+    """
+    contact = np.array(geometry.contact_points)
+    for side in "rl":
+        foot, toes = f"foot_{side}", f"toes_{side}"
+        heel, toe = (CONTACT_POINTS.index(f"{p}_{side}") for p in ("heel", "toe"))
+        ball = geometry.joint_offsets[NODE_INDEX[toes], 0]
+        marker = points[f"heel_{side}"] - frames.positions[foot]
+        behind = np.median(np.einsum("fb,fb->f", frames.rotations[foot][..., 0], marker))
+        contact[heel, 0] = min(behind + MARKER_BEHIND_HEEL, -SHORTEST_HEEL)
+        contact[toe, 0] = (1 / BALL_FRACTION - 1) * (ball - contact[heel, 0])
+        if f"toe_tip_{side}" in points:
+            marker = points[f"toe_tip_{side}"] - frames.positions[toes]
+            ahead = np.median(np.einsum("fb,fb->f", frames.rotations[toes][..., 0], marker))
+            contact[toe, 0] = max(ahead, 0.5 * contact[toe, 0])
+    return replace(geometry, contact_points=contact)
 
 
 def _upright(pelvis: Array) -> Array:

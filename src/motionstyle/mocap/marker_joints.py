@@ -142,12 +142,12 @@ def _rigid(cluster: Array) -> tuple[Array, Array]:
     return rotation, centre
 
 
-def common_centre(upper: Array, lower: Array) -> tuple[Array, Array]:
+def common_centre(upper: Array, lower: Array, *, hinge: bool) -> tuple[Array, Array]:
     """Return the point two clusters (F, K, 3) turn about, and their mean axis, (F, 3) each.
 
     Symmetrical centre of rotation (Ehrig et al. 2006): the point fixed in both that moves least
-    between them. About one axis only, the point is free along it: it is then the one nearest to
-    the clusters. The axis is the direction in the upper cluster that is least determined.
+    between them. Along the axis of a hinge the point is free: it is then the one nearest to the
+    clusters. The axis is the direction in the upper cluster that is least determined.
     """
     r1, t1 = _rigid(upper)
     r2, t2 = _rigid(lower)
@@ -155,7 +155,7 @@ def common_centre(upper: Array, lower: Array) -> tuple[Array, Array]:
     design = np.concatenate([r1[good], -r2[good]], axis=2).reshape(-1, 6)
     offset = (t2 - t1)[good].reshape(-1)
     u, size, v = np.linalg.svd(design, full_matrices=False)
-    keep = size > 0.25 * size[0]
+    keep = slice(0, 5 if hinge else 6)
     local = v[keep].T @ ((u[:, keep].T @ offset) / size[keep])
     axis = r1 @ unit(v[-1, :3])
     return (r1 @ local[:3] + t1 + r2 @ local[3:] + t2) / 2, axis
@@ -166,8 +166,8 @@ def _from_clusters(
 ) -> tuple[Array, Array, Array]:
     """Return knee, ankle and knee axis from the motion of thigh, shank and foot clusters."""
     thigh, shank, foot = (clusters[f"{n}_{side}"] for n in ("thigh", "shank", "foot"))
-    ankle, _ = common_centre(shank, foot)
-    knee, axis = common_centre(thigh, shank)
+    ankle, _ = common_centre(shank, foot, hinge=False)
+    knee, axis = common_centre(thigh, shank, hinge=True)
     axis = axis * np.sign(np.nanmedian((axis * right).sum(axis=1)))
     # along its axis the knee lies where hip and ankle lie on average
     slide = np.nanmedian((((hip + ankle) / 2 - knee) * axis).sum(axis=1))

@@ -129,7 +129,7 @@ def smooth_paths(paths: Array, seen: NDArray[np.bool_], rate_hz: float, cutoff_h
     for m in np.flatnonzero(~seen.all(axis=0)):
         mask = np.array(seen[:, m])
         for first, last in runs(~mask):
-            if 0 < first and last < len(mask) - 1 and last - first + 1 <= longest:
+            if first > 0 and last < len(mask) - 1 and last - first + 1 <= longest:
                 mask[first : last + 1] = True
         for first, last in runs(mask):
             stretch = slice(first, last + 1)

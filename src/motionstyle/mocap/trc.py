@@ -25,7 +25,8 @@ def read_trc(path: str | Path) -> MarkerClip:
     Returns
     -------
     MarkerClip
-        Positions in metres by the header's unit, in the file's axes; NaN where a cell is empty.
+        Positions in metres by the header's unit, in the file's axes; NaN where cells are empty or
+        the marker stands exactly at the origin.
 
     Raises
     ------
@@ -60,6 +61,7 @@ def read_trc(path: str | Path) -> MarkerClip:
             f"expected steps of {1 / rate:.5g} s at DataRate {rate:g} Hz",
         )
     problems.stop()
+    positions[(positions == 0).all(axis=-1)] = np.nan  # how some exporters write a missing sample
     return MarkerClip(
         labels=labels,
         positions=positions * UNITS[unit],
