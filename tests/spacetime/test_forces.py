@@ -31,7 +31,7 @@ def test_forces_of_the_basis_stay_in_the_friction_cone_of_any_plane():
 def test_coefficients_are_the_constrained_optimum():
     residuals, columns, bearing = random_problem()
     ridge = 1e-3
-    found = eliminate_forces(residuals, columns, bearing, ridge)
+    found = eliminate_forces(residuals, columns, bearing, np.full((4, 32), ridge))
     for t in range(4):
         allowed = np.repeat(bearing[t], 4)
         assert (found.coefficients[t, ~allowed] == 0).all()
@@ -47,19 +47,19 @@ def test_coefficients_are_the_constrained_optimum():
 
 def test_the_slope_of_the_remaining_cost_is_the_remaining_residual():
     residuals, columns, bearing = random_problem()
-    found = eliminate_forces(residuals, columns, bearing, 1e-3)
+    found = eliminate_forces(residuals, columns, bearing, np.full((4, 32), 1e-3))
     direction, step = np.random.default_rng(8).standard_normal(residuals.shape), 1e-6
-    up = eliminate_forces(residuals + step * direction, columns, bearing, 1e-3).cost
-    down = eliminate_forces(residuals - step * direction, columns, bearing, 1e-3).cost
+    up = eliminate_forces(residuals + step * direction, columns, bearing, np.full((4, 32), 1e-3)).cost
+    down = eliminate_forces(residuals - step * direction, columns, bearing, np.full((4, 32), 1e-3)).cost
     slope = (found.residuals * direction).sum(axis=1)
     np.testing.assert_allclose((up - down) / (2 * step), slope, atol=1e-6)
 
 
 def test_the_curvature_is_that_of_the_remaining_cost():
     residuals, columns, bearing = random_problem()
-    found = eliminate_forces(residuals, columns, bearing, 1e-3)
+    found = eliminate_forces(residuals, columns, bearing, np.full((4, 32), 1e-3))
     direction, step = np.random.default_rng(9).standard_normal(residuals.shape), 1e-5
-    up = eliminate_forces(residuals + step * direction, columns, bearing, 1e-3).residuals
-    down = eliminate_forces(residuals - step * direction, columns, bearing, 1e-3).residuals
+    up = eliminate_forces(residuals + step * direction, columns, bearing, np.full((4, 32), 1e-3)).residuals
+    down = eliminate_forces(residuals - step * direction, columns, bearing, np.full((4, 32), 1e-3)).residuals
     bend = np.einsum("frs,fs->fr", found.weights, direction)
     np.testing.assert_allclose((up - down) / (2 * step), bend, atol=1e-5)

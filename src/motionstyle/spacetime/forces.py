@@ -34,8 +34,8 @@ class Eliminated:
     """Best contact forces and what remains.
 
     coefficients : λ, (F, 4P), N. residuals : weighted, with the forces in, (F, R). weights : the
-    curvature (I + A Aᵀ/ε)⁻¹ of the remaining cost, (F, R, R), A the columns with λ > 0.
-    cost : ½‖residual‖² + ½ε‖λ‖² per frame, (F,).
+    curvature (I + A ε⁻¹ Aᵀ)⁻¹ of the remaining cost, (F, R, R), A the columns with λ > 0.
+    cost : ½‖residual‖² + ½Σ ε λ² per frame, (F,).
     """
 
     coefficients: Array
@@ -45,34 +45,34 @@ class Eliminated:
 
 
 def eliminate_forces(
-    residuals: Array, columns: Array, bearing: NDArray[np.bool_], ridge: float
+    residuals: Array, columns: Array, bearing: NDArray[np.bool_], ridge: Array
 ) -> Eliminated:
-    """Minimise ½‖r + Aλ‖² + ½ε‖λ‖² over λ ≥ 0 in every frame (variable projection).
+    """Minimise ½‖r + Aλ‖² + ½Σ ε_i λ_i² over λ ≥ 0 in every frame (variable projection).
 
     Parameters
     ----------
     residuals : weighted, without contact forces, (F, R).
     columns : weighted response to unit coefficients, (F, R, 4P).
-    bearing : which points may push, (F, P). ridge : ε > 0.
+    bearing : which points may push, (F, P). ridge : ε > 0 of each coefficient, (F, 4P).
     """
     frames, size = residuals.shape
     count = columns.shape[2]
     coefficients = np.zeros((frames, count))
     left = np.array(residuals)
     weights = np.tile(np.eye(size), (frames, 1, 1))
-    root = np.sqrt(ridge)
     for t in range(frames):
         allowed = np.repeat(bearing[t], 4)
         if not allowed.any():
             continue
         a = columns[t][:, allowed]
-        stacked = np.concatenate([a, root * np.eye(a.shape[1])])
+        price = ridge[t, allowed]
+        stacked = np.concatenate([a, np.diag(np.sqrt(price))])
         wanted = np.concatenate([-residuals[t], np.zeros(a.shape[1])])
         found, _ = nnls(stacked, wanted, maxiter=10 * a.shape[1])
         coefficients[t, allowed] = found
         left[t] += a @ found
         active = a[:, found > 0]
-        inner = active.T @ active + ridge * np.eye(active.shape[1])
+        inner = active.T @ active + np.diag(price[found > 0])
         weights[t] -= active @ np.linalg.solve(inner, active.T)
-    cost = 0.5 * (left**2).sum(axis=1) + 0.5 * ridge * (coefficients**2).sum(axis=1)
+    cost = 0.5 * (left**2).sum(axis=1) + 0.5 * (ridge * coefficients**2).sum(axis=1)
     return Eliminated(coefficients, left, weights, cost)

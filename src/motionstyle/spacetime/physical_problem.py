@@ -39,12 +39,14 @@ class PhysicalSettings:
     root_n: float = 20.0
     root_shrink: float = 0.6
     root_least_n: float = 0.3
-    torque_nm: float = 150.0
-    force_n: float = 2000.0
+    torque_nm: float = 100.0
+    force_n: float = 500.0
     slip_m: float = 0.001
     range_rad: float = 0.02
     friction: float = 0.8
-    spread_s: float = 0.034
+    settled_m: float = 0.01
+    settled_mps: float = 0.3
+    spread_s: float = 0.0
     outer: int = 16
     inner: int = 8
     tolerance: float = 1e-3
@@ -67,6 +69,7 @@ class Problem:
     feet: Array
     foot_weights: Array
     bearing: NDArray[np.bool_]
+    ridge: Array
     cone: Array
     ranges: Array
     prior: Array
@@ -119,6 +122,7 @@ def set_up(
         feet=feet,
         foot_weights=weights / settings.slip_m**2,
         bearing=_spread(motion.contacts, round(settings.spread_s * motion.rate_hz)),
+        ridge=np.repeat(_force_prices(points, motion, settings), 4, axis=1),
         cone=cone_basis(motion.contact_normals, settings.friction),
         ranges=np.stack([low, high], axis=1),
         prior=motion.coordinates,
@@ -127,6 +131,18 @@ def set_up(
         root_n=settings.root_n,
         patterns=[slopes.pattern(k) for k in range(1, 5)],
     )
+
+
+def _force_prices(points: Array, motion: Motion, settings: PhysicalSettings) -> Array:
+    """Return what a squared newton costs at each foot point, (F, 8).
+
+    A point that is still settling or already leaving bears little: its price grows with its
+    height and speed, so that weight passes from foot to foot as it does on force plates.
+    """
+    speed = np.linalg.norm(np.gradient(points, 1 / motion.rate_hz, axis=0), axis=-1)
+    height = np.maximum(points[..., 1] - points[..., 1].min(axis=0), 0.0)
+    unrest = (height / settings.settled_m) ** 2 + (speed / settings.settled_mps) ** 2
+    return (1 + unrest) ** 2 / settings.force_n**2
 
 
 def _foot_targets(points: Array, motion: Motion) -> tuple[Array, Array]:
@@ -172,9 +188,8 @@ def evaluate(problem: Problem, controls: Array) -> State:
     scale = _scale(problem)
     shifted = values[0].copy()
     shifted[:, :6] += problem.shift
-    ridge = 1 / settings.force_n**2
     solved = eliminate_forces(
-        shifted * scale, columns.reshape(frames, COUNT, 32) * scale[:, None], problem.bearing, ridge
+        shifted * scale, columns.reshape(frames, COUNT, 32) * scale[:, None], problem.bearing, problem.ridge
     )
     contact = np.einsum("fpc,fpca->fpa", solved.coefficients.reshape(frames, 8, 4), cone)
     root = solved.residuals[:, :6] / scale[:6] - problem.shift
