@@ -1,0 +1,106 @@
+"""Ground reaction forces estimated from markers alone, against force plates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionstyle.motion.motion import Motion
+from motionstyle.motion.resample import lowpass
+
+Array = NDArray[np.float64]
+GRAVITY = 9.81
+LOADED_N = 20.0  # a plate bears a foot above this
+PLATE_CUTOFF_HZ = 20.0
+COMPONENTS = {"vertical": 1, "fore_aft": 0, "lateral": 2}
+FORCE_PLATE_COLUMNS = (
+    *("id", "dataset", "config", "action", "style", "surface", "foot", "component", "mass_kg"),
+    *("mass_source", "rms_pctbw", "correlation", "peak_estimated_pctbw", "peak_plate_pctbw"),
+    *("impulse_estimated_bws", "impulse_plate_bws", "seconds_compared", "status", "reason"),
+)
+
+
+@dataclass(frozen=True)
+class FootForce:
+    """A foot's force on the person over time, in the motion's axes: times (T,) s, (T, 3) N."""
+
+    times: Array
+    force: Array
+
+    def at(self, times: Array) -> Array:
+        """Return the force at other times, low-passed first; NaN outside the record."""
+        rate = (len(self.times) - 1) / (self.times[-1] - self.times[0])
+        smooth = lowpass(np.nan_to_num(self.force), rate, PLATE_CUTOFF_HZ)
+        columns = [
+            np.interp(times, self.times, smooth[:, a], left=np.nan, right=np.nan) for a in range(3)
+        ]
+        return np.stack(columns, axis=1)
+
+
+def compared_frames(plate: Array, estimated: Array, both: Array) -> NDArray[np.bool_]:
+    """Return the frames in which a foot is judged, (F,).
+
+    Where its plate bears it, and where the estimate does within a stance the plates saw: frames
+    in which either is loaded, while the plates together carry the person.
+
+    Parameters
+    ----------
+    plate, estimated : vertical force of the foot, (F,), N. both : of all plates together, (F,).
+    """
+    known = np.isfinite(plate)
+    near = known & (np.nan_to_num(plate) > LOADED_N)
+    return near | (known & (estimated > LOADED_N) & (both > LOADED_N))
+
+
+def force_plate_rows(
+    motion: Motion, plates: Mapping[str, FootForce], config_name: str
+) -> list[dict[str, object]]:
+    """Return one row per foot and component with `FORCE_PLATE_COLUMNS`.
+
+    Parameters
+    ----------
+    motion : physical, with contact forces; no plate value entered them.
+    plates : measured forces by foot, "r" and "l", on the motion's clock and in its axes.
+    """
+    known = motion.provenance
+    shared = {
+        "id": known.get("example", motion.id),
+        "dataset": known.get("dataset", ""),
+        "config": config_name,
+        **{name: known.get(name, "") for name in ("action", "style", "surface")},
+        "mass_kg": motion.body.mass,
+        "mass_source": motion.body.mass_source,
+    }
+    weight = motion.body.mass * GRAVITY
+    measured = {foot: record.at(motion.times) for foot, record in plates.items()}
+    both = np.nansum([force[:, 1] for force in measured.values()], axis=0)
+    rows = []
+    for foot, plate in measured.items():
+        points = slice(0, 4) if foot == "r" else slice(4, 8)
+        estimated = motion.contact_forces[:, points].sum(axis=1)
+        judged = compared_frames(plate[:, 1], estimated[:, 1], both)
+        for component, axis in COMPONENTS.items():
+            row: dict[str, object] = {**shared, "foot": foot, "component": component}
+            if judged.sum() < 5:
+                reason = "the plate saw this foot in fewer than 5 frames"
+                rows.append({**row, "status": "not compared", "reason": reason})
+                continue
+            ours, theirs = estimated[judged, axis] / weight, plate[judged, axis] / weight
+            spread = ours.std() * theirs.std()
+            rows.append(
+                row
+                | {
+                    "rms_pctbw": 100 * float(np.sqrt(((ours - theirs) ** 2).mean())),
+                    "correlation": float(np.corrcoef(ours, theirs)[0, 1]) if spread else np.nan,
+                    "peak_estimated_pctbw": 100 * float(ours[np.argmax(np.abs(ours))]),
+                    "peak_plate_pctbw": 100 * float(theirs[np.argmax(np.abs(theirs))]),
+                    "impulse_estimated_bws": float(ours.sum() / motion.rate_hz),
+                    "impulse_plate_bws": float(theirs.sum() / motion.rate_hz),
+                    "seconds_compared": float(judged.sum() / motion.rate_hz),
+                    "status": "ok",
+                }
+            )
+    return rows
