@@ -40,6 +40,7 @@ FEWEST_FRAMES = 3
 NECK_AHEAD_OF_C7, NECK_ABOVE_ACROMIA = 0.05, 0.03
 BALL_INWARD, BALL_AHEAD = 0.17, 0.04  # of foot length
 MARKER_ABOVE_BALL = 0.015  # m, of a marker on top of or beside a metatarsal head
+LONGEST_TOES = 1.2  # without a marker at their tip, against those of a foot that fits the legs
 MARKER_BEHIND_HEEL, SHORTEST_HEEL = 0.01, 0.02  # m, of a marker's centre; and behind the ankle
 SHOULDER_HALF_WIDTH = 0.18  # m on a leg of 0.86 m
 ARM_OF_LEG = {"upper_arm": 0.2817 / 0.8625, "forearm": 0.2689 / 0.8625}  # de Leva, male
@@ -227,7 +228,9 @@ def _measured_feet(
         marker = points[f"heel_{side}"] - frames.positions[foot]
         behind = np.median(np.einsum("fb,fb->f", frames.rotations[foot][..., 0], marker))
         contact[heel, 0] = min(behind + MARKER_BEHIND_HEEL, -SHORTEST_HEEL)
-        contact[toe, 0] = (1 / BALL_FRACTION - 1) * (ball - contact[heel, 0])
+        behind_ball = ball - contact[heel, 0]
+        usual = np.linalg.norm(contact[toe] * [1, 0, 0])  # of a foot that fits the legs
+        contact[toe, 0] = min((1 / BALL_FRACTION - 1) * behind_ball, usual * LONGEST_TOES)
         if f"toe_tip_{side}" in points:
             marker = points[f"toe_tip_{side}"] - frames.positions[toes]
             ahead = np.median(np.einsum("fb,fb->f", frames.rotations[toes][..., 0], marker))

@@ -162,7 +162,7 @@ def _row(cells: list[str], labels: tuple[str, ...], number: int, problems: Probl
             value = np.inf
         if not np.isfinite(value):
             problems.add(number, f"{labels[at // 3]} {'xyz'[at % 3]} {number_problem(cell)}")
-            value = np.nan
+            value = 0.0
         values.append(value)
     for at, label in enumerate(labels):
         seen = np.isfinite(values[3 * at : 3 * at + 3])
