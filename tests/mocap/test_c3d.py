@@ -115,7 +115,7 @@ def plate_channels(force, at, twist):
     """
     turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     lever = np.asarray(at, dtype=float) - [300, 200, 0]
-    moment = np.cross(lever, force) + [0, 0, twist]
+    moment = np.add(np.cross(lever, force), [0, 0, twist])
     one = np.concatenate([turn @ force, turn @ moment])
     return np.tile(one, (FRAMES * RATIO, 1))
 

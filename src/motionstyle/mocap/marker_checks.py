@@ -36,7 +36,7 @@ def check_size(clip: MarkerClip, assigned: Assigned) -> None:
         for unit, metres in METRES.items()
         if unit != "cmu" and low <= width / now * metres <= high
     ]
-    suggestion = f"; is the unit {' or '.join(fitting)}?" if fitting else ""
+    suggestion = f": is the unit {' or '.join(fitting)}?" if fitting else "."
     raise MotionStyleError(
         f"{clip.source}: the ASIS markers are {width:.4g} m apart (file read in "
         f"{clip.unit}), expected {low} to {high} m{suggestion} Set the column unit of the sheet"
