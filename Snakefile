@@ -20,3 +20,4 @@ rule all:
     input:
         RESULTS / "status/clips.ok",
         RESULTS / "report.html",
+        everything(),

@@ -1,10 +1,12 @@
 """What every job of the workflow does around its one call: the log, and errors in one sentence.
 
-And what a run does before its first job: it forgets the locks of a run that was killed.
+And what a run does before its first job: see that it can write, and forget the locks of a run
+that was killed.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import threading
@@ -84,6 +86,19 @@ def _termination_as_interrupt() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, former)
+
+
+def check_writable(folder: str | Path) -> None:
+    """Refuse a folder for results that neither is one nor can be made, or cannot be written to."""
+    folder = Path(folder)
+    there = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    if not there.is_dir():
+        raise MotionStyleError(f"results_root {folder}: {there} is a file, not a folder")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise MotionStyleError(
+            f"results_root {folder}: {there} cannot be written to; choose another folder "
+            "(--config results_root=FOLDER) or change its permissions"
+        )
 
 
 def forget_killed_runs(folder: str | Path) -> IO[str] | None:

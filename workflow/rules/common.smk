@@ -10,7 +10,7 @@ from snakemake.exceptions import WorkflowError
 import motionstyle
 from motionstyle.configuration import load_config
 from motionstyle.errors import MotionStyleError
-from motionstyle.jobs import forget_killed_runs
+from motionstyle.jobs import check_writable, forget_killed_runs
 from motionstyle.mocap.doors import read_datasets
 from motionstyle.mocap.planted import read_planted
 from motionstyle.mocap.sheet import EMBEDDED, read_sheet
@@ -34,6 +34,8 @@ try:
             config[key] = str(located(config[key]))
     CONFIG = load_config(config, ROOT / "workflow/schemas/config.schema.json", Path.cwd())
     DATASETS = read_datasets(CONFIG["datasets"])
+    if workflow.is_main_process:
+        check_writable(CONFIG["results_root"])
     WHEEL = read_wheel_pin(CONFIG["embedded"])
     SKELETONS = Path(CONFIG["skeletons"])
     CLIPS = {
@@ -128,3 +130,12 @@ SHOWN = {
     for figure, ids in CONFIG["figures"].items()
 }
 FIGURES = ["body", "strips", "gait", "markers", *(["planted"] if PLANTED else [])]
+
+
+def everything():
+    """Return all files a run makes, so that one that was deleted is made again."""
+    motions = motion_files()
+    figures = [RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")]
+    quality = [RESULTS / f"quality/{id}.json" for id in CLIPS]
+    sidecars = [file.with_suffix(".json") for file in motions]
+    return [*TABLES, RESULTS / "tables/claims.csv", *figures, *quality, *motions, *sidecars]
