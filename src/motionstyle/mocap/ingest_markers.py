@@ -20,7 +20,7 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.c3d import read_c3d, read_c3d_forces
 from motionstyle.mocap.contacts import detect_contacts, ground_height
 from motionstyle.mocap.ingest import FEWEST_FRAMES, Ingested, provenance
-from motionstyle.mocap.marker_body import measure_markers
+from motionstyle.mocap.marker_body import measure_markers, with_trunk_of
 from motionstyle.mocap.marker_checks import check_clip_of_person, heading
 from motionstyle.mocap.marker_clip import (
     ForceRecord,
@@ -143,6 +143,8 @@ def ingest_markers(
         known = assign_labels(still, markers)
         check_clip_of_person(still, known)
         person = measure_markers(still, known, markers, sex, thresholds)
+        leg = build_body(person.geometry, 1.0, sex).leg_length
+        person = with_trunk_of(person, clip, assigned, leg, sex)
     mass = default_mass_kg if row.mass_kg is None else row.mass_kg
     source = "default" if row.mass_kg is None else "sheet"
     body = build_body(person.geometry, mass, sex, mass_source=source)

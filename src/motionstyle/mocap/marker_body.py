@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from motionstyle.body.anthropometry import (
     BALL_FRACTION,
-    REFERENCE_LENGTHS,
-    TRUNK_LENGTHS,
     Sex,
 )
 from motionstyle.body.body import BodyGeometry
-from motionstyle.body.layout import CONTACT_POINTS, NODE_INDEX
-from motionstyle.body.rotations import exponential
+from motionstyle.body.layout import CONTACT_POINTS, NODE_INDEX, NODES, PARENTS
 from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.body_fit import NodeFrames, foot_length, measure_body
 from motionstyle.mocap.floor import StanceThresholds
@@ -30,20 +27,18 @@ from motionstyle.mocap.marker_joints import (
     pelvis_frame,
     unit,
 )
+from motionstyle.mocap.marker_upper_body import add_arm, add_trunk, head_frames
 from motionstyle.mocap.markerset import NEEDED_TO_MEASURE, Assigned, MarkerSet
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])
 FEWEST_FRAMES = 3
-# Proportions of ours where a set lacks the landmark: the neck's joint lies ahead of the C7 marker
-# and above mid-acromion; the ball's middle lies inward of and ahead of the fifth metatarsal.
-NECK_AHEAD_OF_C7, NECK_ABOVE_ACROMIA = 0.05, 0.03
+# Where a set lacks the inner marker, the ball's middle lies inward of and ahead of the fifth
+# metatarsal's head (proportions of ours).
 BALL_INWARD, BALL_AHEAD = 0.17, 0.04  # of foot length
 MARKER_ABOVE_BALL = 0.015  # m, of a marker on top of or beside a metatarsal head
 LONGEST_TOES = 1.2  # without a marker at their tip, against those of a foot that fits the legs
 MARKER_BEHIND_HEEL, SHORTEST_HEEL = 0.01, 0.02  # m, of a marker's centre; and behind the ankle
-SHOULDER_HALF_WIDTH = 0.18  # m on a leg of 0.86 m
-ARM_OF_LEG = {"upper_arm": 0.2817 / 0.8625, "forearm": 0.2689 / 0.8625}  # de Leva, male
 
 
 @dataclass(frozen=True)
@@ -110,9 +105,9 @@ def measure_markers(
     offsets = {}
     for label, node in assigned.nodes.items():
         away = positions[:, clip.labels.index(label)] - frames.positions[node]
-        offset = np.einsum("fba,fb->fa", frames.rotations[node], away)
-        if np.isfinite(offset).all(axis=1).any():
-            offsets[label] = np.nanmedian(offset, axis=0)
+        place = _in_frame(frames.rotations[node], away)
+        if np.isfinite(place).all():
+            offsets[label] = place
     forward = frames.rotations["pelvis"][:, 1, 0]
     return MarkerBody(
         geometry=geometry,
@@ -122,6 +117,50 @@ def measure_markers(
         source=clip.source,
         frames=int(whole.sum()),
     )
+
+
+def with_trunk_of(
+    person: MarkerBody, clip: MarkerClip, assigned: Assigned, leg: float, sex: Sex
+) -> MarkerBody:
+    """Return the body with the trunk that the clip itself shows, if it shows the acromia.
+
+    Arms held up in a static trial lift the acromia by centimetres, and a trunk too long for the
+    clip would buckle. Upright is then the clip's median line from mid-hip to neck.
+    """
+    paths = {name: clip.path(label) for name, label in assigned.landmarks.items()}
+    if "acromion_r" not in paths or "acromion_l" not in paths:
+        return person
+    needed = [n for n in paths if n.startswith(("asis", "psis", "sacrum", "acromion", "c7"))]
+    seen = np.all([np.isfinite(paths[n]).all(axis=1) for n in needed], axis=0)
+    if seen.sum() < FEWEST_FRAMES:
+        return person
+    points = {name: path[seen] for name, path in paths.items()}
+    position = {"pelvis": sum(hip_centres(points).values()) / 2}
+    rotation = {"pelvis": pelvis_frame(points)}
+    add_trunk(points, position, rotation, leg, sex)
+    thorax = rotation["thorax"]
+    for side in "rl":
+        position[f"upper_arm_{side}"] = arm_joints(points, thorax, side, leg)[0]
+    joints = np.array(person.geometry.joint_offsets)
+    for node in ("abdomen", "thorax", "head", "upper_arm_r", "upper_arm_l"):
+        parent = NODES[PARENTS[NODE_INDEX[node]]]
+        away = position[node] - position[parent]
+        joints[NODE_INDEX[node]] = _in_frame(rotation[parent], away)
+    offsets = dict(person.offsets)
+    for label, node in assigned.nodes.items():
+        if node == "thorax":
+            place = _in_frame(thorax, clip.path(label)[seen] - position["thorax"])
+            if np.isfinite(place).all():
+                offsets[label] = place
+    geometry = replace(person.geometry, joint_offsets=joints)
+    return replace(person, geometry=geometry, offsets=offsets)
+
+
+def _in_frame(rotation: Array, away: Array) -> Array:
+    """Return the median of vectors (F, 3) in moving frames (F, 3, 3), frames without one apart."""
+    local = np.einsum("fba,fb->fa", rotation, away)
+    local = local[np.isfinite(local).all(axis=1)]
+    return np.median(local, axis=0) if len(local) else np.full(3, np.nan)
 
 
 def _check_measurable(clip: MarkerClip, assigned: Assigned, markers: MarkerSet) -> None:
@@ -178,10 +217,10 @@ def _node_frames(
     leg = float(np.mean(legs))
     for side in "rl":
         _foot(points, position, rotation, side, foot_length(leg, sex))
-    _trunk(points, position, rotation, leg, sex)
+    add_trunk(points, position, rotation, leg, sex)
     for side in "rl":
-        _arm(points, position, rotation, leg, side)
-    rotation["head"] = _head(points, rotation["thorax"])
+        add_arm(points, position, rotation, leg, side)
+    rotation["head"] = head_frames(points, rotation["thorax"])
     return NodeFrames(position, rotation, {})
 
 
@@ -236,89 +275,3 @@ def _measured_feet(
             ahead = np.median(np.einsum("fb,fb->f", frames.rotations[toes][..., 0], marker))
             contact[toe, 0] = max(ahead, 0.5 * contact[toe, 0])
     return replace(geometry, contact_points=contact)
-
-
-def _upright(pelvis: Array) -> Array:
-    """Return frames that share the pelvis' heading but stand upright, (F, 3, 3)."""
-    right = unit(pelvis[..., 2] * [1, 0, 1])
-    up = np.broadcast_to(UP, right.shape)
-    return frame(np.cross(up, right), up, right)
-
-
-def _trunk(
-    points: dict[str, Array],
-    position: dict[str, Array],
-    rotation: dict[str, Array],
-    leg: float,
-    sex: Sex,
-) -> None:
-    """Add abdomen and thorax, cut at de Leva's proportions between mid-hip and neck."""
-    lower, middle, upper = TRUNK_LENGTHS[sex]
-    whole = lower + middle + upper
-    mid_hip = position["pelvis"]
-    upright = _upright(rotation["pelvis"])
-    if "acromion_r" in points and "acromion_l" in points:
-        acromia = (points["acromion_r"] + points["acromion_l"]) / 2
-        right = points["acromion_r"] - points["acromion_l"]
-        top = points.get("c7", acromia)
-        up = unit(top - mid_hip)
-        ahead = np.cross(up, across(right, up))
-        neck = top + (NECK_AHEAD_OF_C7 * ahead if "c7" in points else NECK_ABOVE_ACROMIA * up)
-        up = unit(neck - mid_hip)
-        right = across(right, up)
-        rotation["thorax"] = frame(np.cross(up, right), up, right)
-    else:
-        reference = REFERENCE_LENGTHS[sex]
-        neck = mid_hip + whole * leg / (reference["thigh"] + reference["shank"]) * UP
-        rotation["thorax"] = upright
-    rotation["abdomen"] = rotation["thorax"]
-    position["abdomen"] = mid_hip + lower / whole * (neck - mid_hip)
-    position["thorax"] = mid_hip + (lower + middle) / whole * (neck - mid_hip)
-    position["head"] = neck
-
-
-def _arm(
-    points: dict[str, Array],
-    position: dict[str, Array],
-    rotation: dict[str, Array],
-    leg: float,
-    side: str,
-) -> None:
-    """Add one arm; a limb without markers hangs from the shoulder with de Leva's lengths."""
-    thorax, sign = rotation["thorax"], 1.0 if side == "r" else -1.0
-    scale = leg / 0.8625
-    elbow = wrist = axis = None
-    if "acromion_r" in points and "acromion_l" in points:
-        shoulder, elbow, wrist, axis = arm_joints(points, thorax, side, leg)
-    else:
-        down = np.array([0.0, -0.05 * scale, sign * SHOULDER_HALF_WIDTH * scale])
-        shoulder = position["head"] + thorax @ down
-    if elbow is None or wrist is None or axis is None:
-        hanging = thorax[..., 1]
-        axis = thorax[..., 2]
-        elbow = shoulder - ARM_OF_LEG["upper_arm"] * leg * hanging
-        wrist = elbow - ARM_OF_LEG["forearm"] * leg * hanging
-    upper, lower = unit(shoulder - elbow), unit(elbow - wrist)
-    hinge = across(axis, lower)
-    position |= {f"upper_arm_{side}": shoulder, f"forearm_{side}": elbow, f"hand_{side}": wrist}
-    rotation[f"upper_arm_{side}"] = frame(np.cross(upper, axis), upper, axis)
-    rotation[f"forearm_{side}"] = frame(np.cross(lower, hinge), lower, hinge)
-    rotation[f"hand_{side}"] = rotation[f"forearm_{side}"]
-
-
-def _head(points: dict[str, Array], thorax: Array) -> Array:
-    """Return the head's frame: rigid with its markers, upright and ahead on average."""
-    if "head_front_r" not in points or "head_front_l" not in points:
-        return thorax
-    right = unit(points["head_front_r"] - points["head_front_l"])
-    front = (points["head_front_r"] + points["head_front_l"]) / 2
-    if "head_back_r" in points and "head_back_l" in points:
-        back = (points["head_back_r"] + points["head_back_l"]) / 2
-        ahead = across(front - back, right)
-    elif "head_top" in points:
-        ahead = np.cross(across(points["head_top"] - front, right), right)
-    else:
-        return thorax
-    rough = frame(ahead, np.cross(right, ahead), right)
-    nod = np.median(np.arcsin(np.clip(ahead[:, 1], -1, 1)))
-    return rough @ exponential(np.array([0.0, 0.0, -nod]))

@@ -53,8 +53,12 @@ def check_upright(clip: MarkerClip, assigned: Assigned) -> None:
     """
     found = assigned.landmarks
     pelvis = (clip.path(found["asis_r"]) + clip.path(found["asis_l"])) / 2
-    heels = (clip.path(found["heel_r"]) + clip.path(found["heel_l"])) / 2
-    line = np.nanmedian(pelvis - heels, axis=0)
+    legs = [pelvis - clip.path(found[f"heel_{side}"]) for side in "rl"]
+    whole = np.concatenate(legs)
+    whole = whole[np.isfinite(whole).all(axis=1)]
+    if not len(whole):
+        return  # never seen together: measuring the body says so
+    line = np.median(whole, axis=0)
     line /= np.linalg.norm(line)
     if line[1] < HANGING:
         axis = "xyz"[int(np.argmax(np.abs(line)))]

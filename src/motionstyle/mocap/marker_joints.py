@@ -192,10 +192,9 @@ def arm_joints(
         return shoulder, None, None, None
     wrist = sum(wrists) / len(wrists)
     inner = points.get(f"elbow_medial_{side}")
-    bone = unit(shoulder - outer)
     if inner is not None:
         elbow = (outer + inner) / 2
-        axis = across(sign * (outer - inner), bone)
+        axis = sign * (outer - inner)
     else:
         elbow = outer
         for _ in range(2):
@@ -203,4 +202,5 @@ def arm_joints(
             plane = np.cross(-bone, unit(wrist - elbow))
             axis = across(plane + BEND * thorax[..., 2], bone)
             elbow = outer - sign * HALF_ELBOW * leg * axis
+    axis = across(axis, unit(shoulder - elbow))
     return shoulder, elbow, wrist, axis
