@@ -13,12 +13,15 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.jobs import check_writable, forget_killed_runs
 from motionstyle.mocap.doors import read_datasets
 from motionstyle.mocap.planted import read_planted
-from motionstyle.mocap.sheet import EMBEDDED, read_sheet
+from motionstyle.mocap.sheet import EMBEDDED, MARKER_FILES, read_sheet
 from motionstyle.mocap.wheel import read_wheel_pin
 
 ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
-PATH_KEYS = ("motions", "datasets", "embedded", "claims", "skeletons", "planted", "normative")
+PATH_KEYS = (
+    *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
+    *("planted", "normative"),
+)
 
 
 def located(path):
@@ -37,14 +40,14 @@ try:
     if workflow.is_main_process:
         check_writable(CONFIG["results_root"])
     WHEEL = read_wheel_pin(CONFIG["embedded"])
-    SKELETONS = Path(CONFIG["skeletons"])
+    SKELETONS, MARKERSETS = Path(CONFIG["skeletons"]), Path(CONFIG["markersets"])
     CLIPS = {
         row.id: row
         for row in read_sheet(
             CONFIG["motions"],
             DATASETS,
             embedded_files=WHEEL.names,
-            skeletons={file.stem for file in SKELETONS.glob("*.yaml")},
+            skeletons={f.stem for kind in (SKELETONS, MARKERSETS) for f in kind.glob("*.yaml")},
         )
     }
     # Variants are planted on embedded clips only; a sheet without the base plants none.
@@ -65,8 +68,14 @@ BENCHMARKS = RESULTS / "benchmarks"
 SOURCES = RESULTS / "sources"
 MOTIONS = RESULTS / "motions"
 MIRRORED = [f"{id}_mirror" for id, row in CLIPS.items() if row.mirror]
+# Clips with force plates, against which estimated forces are held.
+PLATES = [id for id, row in CLIPS.items() if row.forces and "force_plates" in row.experiments]
 # Clips that are made to obey Newton.
-PHYSICAL = [id for id, row in CLIPS.items() if row.level == "physical" or "nio" in row.experiments]
+PHYSICAL = [
+    id
+    for id, row in CLIPS.items()
+    if row.level == "physical" or "nio" in row.experiments or id in PLATES
+]
 
 
 wildcard_constraints:
@@ -101,6 +110,16 @@ def source_file(row, name=None):
     return SOURCES / "datasets" / (name or row.path)
 
 
+def is_markers(row):
+    """Whether a clip is measured markers, not a skeleton's motion."""
+    return row.path.lower().endswith(MARKER_FILES)
+
+
+def map_file(row):
+    """Return the skeleton map or marker set a clip is read with."""
+    return (MARKERSETS if is_markers(row) else SKELETONS) / f"{row.skeleton}.yaml"
+
+
 def skeleton_files(row):
     """Return the files a clip needs beside its own to be read: ASF or URDF."""
     if row.dataset == EMBEDDED:
@@ -109,6 +128,12 @@ def skeleton_files(row):
         beside = row.local_file(str(Path(row.path).with_name("humanoid.urdf")))
         return [beside if beside.exists() else SOURCES / EMBEDDED / "humanoid.urdf"]
     return [source_file(row, name) for name in row.companions if name.lower().endswith(".asf")]
+
+
+def companion(id, kind):
+    """Return the file of a clip's static trial or force plates, as a list of one or none."""
+    name = getattr(CLIPS[id], kind)
+    return [source_file(CLIPS[id], name)] if name else []
 
 
 def motion_files():
@@ -121,7 +146,7 @@ def motion_files():
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
 TABLES = [
     RESULTS / f"tables/{name}.csv"
-    for name in ("body", "clips", "motions", "gait_angles", "gait", "physical")
+    for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
 ]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
@@ -129,7 +154,9 @@ SHOWN = {
     figure: [id for id in ids if id in CLIPS] or list(CLIPS)[:4]
     for figure, ids in CONFIG["figures"].items()
 }
-FIGURES = ["body", "strips", "gait", "markers", *(["planted"] if PLANTED else [])]
+FIGURES = ["body", "strips", "gait", "markers"]
+FIGURES += ["planted"] if PLANTED else []
+FIGURES += ["force_plates"] if PLATES else []
 
 
 def everything():

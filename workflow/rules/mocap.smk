@@ -41,7 +41,9 @@ rule retarget:
     input:
         clip=lambda wildcards: source_file(CLIPS[wildcards.clip]),
         skeleton_files=lambda wildcards: skeleton_files(CLIPS[wildcards.clip]),
-        map=lambda wildcards: SKELETONS / f"{CLIPS[wildcards.clip].skeleton}.yaml",
+        map=lambda wildcards: map_file(CLIPS[wildcards.clip]),
+        static=lambda wildcards: companion(wildcards.clip, "static"),
+        forces=lambda wildcards: companion(wildcards.clip, "forces"),
     output:
         motion=MOTIONS / "captured/{clip}.npz",
         sidecar=MOTIONS / "captured/{clip}.json",

@@ -38,7 +38,10 @@ rule fit_physical:
         mem_mb=1500,
     params:
         library=library("body", "motion", "dynamics", "spacetime"),
-        physical=CONFIG["physical"],
+        physical=lambda wildcards: {
+            **CONFIG["physical"],
+            **(CONFIG["force_plates"] if wildcards.clip in PLATES else {}),
+        },
     script:
         "../scripts/fit_physical.py"
 
@@ -60,3 +63,62 @@ rule physical_table:
         config=CONFIG["name"],
     script:
         "../scripts/physical_table.py"
+
+
+rule compare_plates:
+    input:
+        motion=MOTIONS / "captured/{clip}_physical.npz",
+        forces=lambda wildcards: companion(wildcards.clip, "forces"),
+        map=lambda wildcards: map_file(CLIPS[wildcards.clip]),
+    output:
+        rows=RESULTS / "force_plates/{clip}.json",
+    log:
+        LOGS / "compare_plates/{clip}.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "mocap", "evaluation"),
+        config=CONFIG["name"],
+        up_axis=lambda wildcards: CLIPS[wildcards.clip].up_axis,
+    script:
+        "../scripts/compare_plates.py"
+
+
+rule force_plates_table:
+    input:
+        rows=[RESULTS / f"force_plates/{id}.json" for id in PLATES],
+    output:
+        table=RESULTS / "tables/force_plates.csv",
+    log:
+        LOGS / "force_plates_table.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=500,
+    params:
+        library=library("evaluation"),
+    script:
+        "../scripts/force_plates_table.py"
+
+
+rule figure_force_plates:
+    input:
+        rows=[RESULTS / f"force_plates/{id}.json" for id in PLATES],
+    output:
+        svg=RESULTS / "figures/force_plates.svg",
+        png=RESULTS / "figures/force_plates.png",
+    log:
+        LOGS / "figures/force_plates.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("evaluation", "figures"),
+    script:
+        "../scripts/figure_force_plates.py"

@@ -6,22 +6,30 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.files import write_json
 from motionstyle.jobs import job
 from motionstyle.mocap.ingest import ingest_clip, provenance
+from motionstyle.mocap.ingest_markers import ingest_markers
 from motionstyle.mocap.settings import RetargetSettings
-from motionstyle.mocap.sheet import ClipRow
+from motionstyle.mocap.sheet import MARKER_FILES, ClipRow
 from motionstyle.motion.storage import save_failure, save_motion
 
 with job(snakemake.log[0]):
-    params, output = snakemake.params, snakemake.output
+    params, given, output = snakemake.params, snakemake.input, snakemake.output
     row = ClipRow(**params.row, experiments=params.experiments, note=None, row=0, folder=Path())
+    if row.path.lower().endswith(MARKER_FILES):
+        ingest = ingest_markers
+        companions = {
+            "static_file": next(iter(given.static), None),
+            "forces_file": next(iter(given.forces), None),
+        }
+    else:
+        ingest, companions = ingest_clip, {"skeleton_file": next(iter(given.skeleton_files), None)}
     try:
-        found = ingest_clip(
+        found = ingest(
             row,
-            snakemake.input.clip,
-            Path(snakemake.input.map).parent,
+            given.clip,
+            Path(given.map).parent,
             RetargetSettings.from_config(params.retarget, params.contacts),
-            skeleton_file=next(iter(snakemake.input.skeleton_files), None),
-            default_mass_kg=params.body["default_mass_kg"],
-            default_sex=params.body["default_sex"],
+            **companions,
+            **params.body,
         )
     except MotionStyleError as error:
         print(f"failed: {error}")

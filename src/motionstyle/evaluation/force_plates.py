@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,3 +105,28 @@ def force_plate_rows(
                 }
             )
     return rows
+
+
+def force_curves(motion: Motion, plates: Mapping[str, FootForce]) -> list[dict[str, Any]]:
+    """Return, per foot, times (s) and estimated and measured force in body weights, for figures.
+
+    Lists of three components in the order of `COMPONENTS`; None where the plates say nothing.
+    """
+    weight = motion.body.mass * GRAVITY
+    curves = []
+    for foot, record in plates.items():
+        points = slice(0, 4) if foot == "r" else slice(4, 8)
+        estimated = motion.contact_forces[:, points].sum(axis=1) / weight
+        measured = record.at(motion.times) / weight
+        curves.append(
+            {
+                "foot": foot,
+                "times": motion.times.tolist(),
+                "estimated": [estimated[:, axis].tolist() for axis in COMPONENTS.values()],
+                "measured": [
+                    [float(v) if np.isfinite(v) else None for v in measured[:, axis]]
+                    for axis in COMPONENTS.values()
+                ],
+            }
+        )
+    return curves

@@ -55,10 +55,17 @@ def settings_from(config: Mapping[str, float]) -> PhysicalSettings:
 
 
 def prepare(motion: Motion, config: Mapping[str, float]) -> Motion:
-    """Return the motion at the fit's rate, cut to its middle `longest_s` seconds."""
+    """Return the motion at the fit's rate, cut to its middle `longest_s` seconds.
+
+    Where it is cut, `provenance["cut_start_s"]` tells the time of the new first frame.
+    """
     slow = resample(motion, config["rate_hz"])
     extra = slow.frames - round(config["longest_s"] * config["rate_hz"])
-    return slow.window(extra // 2, slow.frames - 1 - (extra - extra // 2)) if extra > 0 else slow
+    if extra <= 0:
+        return slow
+    first = extra // 2
+    cut = slow.window(first, slow.frames - 1 - (extra - first))
+    return replace(cut, provenance={**cut.provenance, "cut_start_s": first / slow.rate_hz})
 
 
 def fit_physical(

@@ -178,7 +178,6 @@ def _dense(values: Array, pattern: tuple, shape: tuple[int, int]) -> Array:
 
 def evaluate(problem: Problem, controls: Array) -> State:
     """Return cost, forces and root residual at control points."""
-    settings = problem.settings
     q, qd, qdd = problem.basis.evaluate(controls)
     frames = len(q)
     values = problem.slopes(q, qd, qdd, np.zeros((frames, 24)), problem.parameters)
@@ -189,7 +188,10 @@ def evaluate(problem: Problem, controls: Array) -> State:
     shifted = values[0].copy()
     shifted[:, :6] += problem.shift
     solved = eliminate_forces(
-        shifted * scale, columns.reshape(frames, COUNT, 32) * scale[:, None], problem.bearing, problem.ridge
+        shifted * scale,
+        columns.reshape(frames, COUNT, 32) * scale[:, None],
+        problem.bearing,
+        problem.ridge,
     )
     contact = np.einsum("fpc,fpca->fpa", solved.coefficients.reshape(frames, 8, 4), cone)
     root = solved.residuals[:, :6] / scale[:6] - problem.shift
