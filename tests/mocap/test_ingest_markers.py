@@ -17,9 +17,11 @@ from motionstyle.body.layout import COORDINATE_INDEX, COORDINATES, NODE_INDEX
 from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.doors import read_datasets
 from motionstyle.mocap.ingest_markers import ingest_markers, placed_forces
+from motionstyle.mocap.marker_clip import ForceRecord
 from motionstyle.mocap.marker_joints import common_centre
 from motionstyle.mocap.marker_paths import Placement, fill_gaps
-from motionstyle.mocap.markerset import read_marker_set
+from motionstyle.mocap.markerset import Plates, read_marker_set
+from motionstyle.mocap.plate_feet import forces_by_foot, middle_of_feet
 from motionstyle.mocap.sheet import ClipRow, read_sheet
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
@@ -340,3 +342,63 @@ def test_real_clips_fit_within_the_goal(name):
     assert speed == pytest.approx(SPEEDS[name], abs=0.15)
     assert motion.contacts[:, :4].any()
     assert motion.contacts[:, 4:].any()
+
+
+@pytest.mark.parametrize("foot", ["nearest", "as it says"])
+def test_loads_go_to_the_foot_that_stands_there(plain_motion, foot):
+    feet = middle_of_feet(plain_motion)
+    count = plain_motion.frames
+    force = np.zeros((3, count, 3))
+    centre = np.full((3, count, 3), np.nan)
+    for plate, frames, side in (
+        (0, slice(10, 60), 0),
+        (1, slice(50, 90), 1),
+        (2, slice(40, 60), 0),
+    ):
+        force[plate, frames, 1] = 400.0
+        centre[plate, frames] = feet[frames, side] * [1, 0, 1]
+    centre[2, 40:60] += [0.1, 0, 0]
+    record = ForceRecord(
+        ("a", "b", "c"), force, centre, np.zeros_like(force), plain_motion.rate_hz, "made"
+    )
+    names = {"a": "right", "b": "left", "c": "right"}
+    plates = Plates("*", names if foot == "as it says" else dict.fromkeys(names, "nearest"))
+    found = forces_by_foot(plain_motion, record, plates)
+    assert found.names == ("right", "left")
+    np.testing.assert_allclose(found.force[0, 10:40, 1], 400)
+    np.testing.assert_allclose(found.force[0, 40:60, 1], 800)
+    np.testing.assert_allclose(found.force[1, 50:90, 1], 400)
+    assert found.force[1, :50].max() == 0
+    middle = feet[40:60, 0] * [1, 0, 1] + [0.05, 0, 0]
+    np.testing.assert_allclose(found.centre[0, 40:60], middle)
+    assert np.isnan(found.centre[1, :50]).all()
+    np.testing.assert_allclose(found.moment, 0, atol=1e-9)
+
+
+PLATES = {  # a foot whose every step the plates bear
+    "rajagopal_walk": "right", "gait2354_walk": "left", "opencap4_walk_1": "right",
+    "opencapx_walk_2": "right", "rajagopal_run": "left",
+}  # fmt: skip
+
+
+@pytest.mark.mirror
+@pytest.mark.skipif(not MIRROR.is_dir(), reason="no mirror folder")
+@pytest.mark.parametrize("name", sorted(PLATES))
+def test_contacts_agree_with_the_plates(name):
+    one = next(r for r in sheet_rows() if r.id == name)
+    found = ingest_markers(
+        one, MIRROR / one.path, SETS, SETTINGS,
+        static_file=MIRROR / one.static if one.static else None,
+        forces_file=MIRROR / one.forces, default_mass_kg=70.0, default_sex="male",
+    )  # fmt: skip
+    motion, markers = found.motion, read_marker_set(SETS, one.skeleton)
+    record = placed_forces(motion, MIRROR / one.forces, markers)
+    feet = forces_by_foot(motion, record, markers.plates(one.forces))
+    side = feet.names.index(PLATES[name])
+    frames = np.round(feet.times * motion.rate_hz).astype(int)
+    inside = (frames >= 0) & (frames < motion.frames)
+    loaded = feet.force[side, inside, 1] > 20
+    contact = motion.contacts[frames[inside], 4 * side : 4 * side + 4].any(axis=1)
+    assert (loaded == contact).mean() > 0.94
+    away = middle_of_feet(motion)[frames[inside], side] - feet.centre[side, inside]
+    assert np.nanmedian(np.linalg.norm(away[:, [0, 2]], axis=1)) < 0.14
