@@ -22,7 +22,8 @@ NAMES = (
 @pytest.fixture
 def root(tmp_path):
     """A folder with every file a configuration names."""
-    (tmp_path / "config" / "skeletons").mkdir(parents=True)
+    for folder in ("skeletons", "markersets"):
+        (tmp_path / "config" / folder).mkdir(parents=True)
     for name in NAMES:
         (tmp_path / "config" / name).write_text("")
     return tmp_path

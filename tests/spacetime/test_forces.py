@@ -49,8 +49,12 @@ def test_the_slope_of_the_remaining_cost_is_the_remaining_residual():
     residuals, columns, bearing = random_problem()
     found = eliminate_forces(residuals, columns, bearing, np.full((4, 32), 1e-3))
     direction, step = np.random.default_rng(8).standard_normal(residuals.shape), 1e-6
-    up = eliminate_forces(residuals + step * direction, columns, bearing, np.full((4, 32), 1e-3)).cost
-    down = eliminate_forces(residuals - step * direction, columns, bearing, np.full((4, 32), 1e-3)).cost
+    up = eliminate_forces(
+        residuals + step * direction, columns, bearing, np.full((4, 32), 1e-3)
+    ).cost
+    down = eliminate_forces(
+        residuals - step * direction, columns, bearing, np.full((4, 32), 1e-3)
+    ).cost
     slope = (found.residuals * direction).sum(axis=1)
     np.testing.assert_allclose((up - down) / (2 * step), slope, atol=1e-6)
 
@@ -59,7 +63,11 @@ def test_the_curvature_is_that_of_the_remaining_cost():
     residuals, columns, bearing = random_problem()
     found = eliminate_forces(residuals, columns, bearing, np.full((4, 32), 1e-3))
     direction, step = np.random.default_rng(9).standard_normal(residuals.shape), 1e-5
-    up = eliminate_forces(residuals + step * direction, columns, bearing, np.full((4, 32), 1e-3)).residuals
-    down = eliminate_forces(residuals - step * direction, columns, bearing, np.full((4, 32), 1e-3)).residuals
+    up = eliminate_forces(
+        residuals + step * direction, columns, bearing, np.full((4, 32), 1e-3)
+    ).residuals
+    down = eliminate_forces(
+        residuals - step * direction, columns, bearing, np.full((4, 32), 1e-3)
+    ).residuals
     bend = np.einsum("frs,fs->fr", found.weights, direction)
     np.testing.assert_allclose((up - down) / (2 * step), bend, atol=1e-5)

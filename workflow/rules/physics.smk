@@ -82,7 +82,6 @@ rule compare_plates:
     params:
         library=library("body", "motion", "mocap", "evaluation"),
         config=CONFIG["name"],
-        up_axis=lambda wildcards: CLIPS[wildcards.clip].up_axis,
     script:
         "../scripts/compare_plates.py"
 
