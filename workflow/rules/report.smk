@@ -144,7 +144,10 @@ rule publish:
     input:
         tables=[
             RESULTS / f"tables/{name}.csv"
-            for name in ("body", "clips", "gait_angles", "gait", "claims")
+            for name in (
+                *("body", "clips", "gait_angles", "gait", "claims"),
+                *("physical", "force_plates"),
+            )
         ],
         figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],
         stamp=RESULTS / "status/clips.ok",
