@@ -21,7 +21,7 @@ def force_plate_figure(clips: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figu
 
     clips : by id, the curves of `evaluation.force_plates.force_curves`.
     """
-    figure = new_figure(1.25 * len(clips) + 0.6)
+    figure = new_figure(0.8 * len(clips) + 0.8)
     grid = figure.subplots(len(clips), 3, squeeze=False, sharex="row")
     for axes, (id, curves) in zip(grid, clips.items(), strict=True):
         for k, one in enumerate(axes):
