@@ -505,3 +505,13 @@ def test_bvh_and_amc_of_one_trial_are_one_motion():
     assert apart[restored].max() < 5e-3
     assert np.delete(apart, restored).max() < 1e-5
     assert (bvh.contacts != amc.contacts).mean() < 0.002
+
+
+@pytest.mark.parametrize(("frames", "cycles", "shown"), [(115, 3, "0-38"), (40, 1, "0-39")])
+def test_a_clip_that_is_run_through_again_shows_the_frames_of_one_cycle(frames, cycles, shown):
+    from types import SimpleNamespace
+
+    from motionstyle.mocap.ingest import _source_frames
+
+    row = SimpleNamespace(first_frame=None, cycles=cycles)
+    assert _source_frames(row, SimpleNamespace(frames=frames)) == shown

@@ -253,6 +253,10 @@ def provenance(row: ClipRow) -> dict[str, Any]:
 
 
 def _source_frames(row: ClipRow, clip: SkeletonClip) -> str:
-    """Return the frames of the file that the motion shows, such as "1-277"."""
+    """Return the frames of the file that the motion shows, such as "1-277".
+
+    A looping clip that is run through several times shows the frames of one cycle.
+    """
     first = row.first_frame or 0
-    return f"{first}-{first + clip.frames - 1}"
+    frames = (clip.frames - 1) // row.cycles + 1 if row.cycles > 1 else clip.frames
+    return f"{first}-{first + frames - 1}"

@@ -44,9 +44,7 @@ NEUTRAL = "planted-neutral"
 def source_frames_of(motion: Motion) -> set[tuple[str, int]]:
     """Return (file, frame) of the original file for all frames a motion was made from.
 
-    Where the original repeats itself mirrored, the first of the two frames stands for both. A
-    captured clip run through several times counts its frames on; what it shares with another
-    motion is then at least what is shown.
+    Where the original repeats itself mirrored, the first of the two frames stands for both.
     """
     file = str(motion.provenance.get("source", motion.id))
     twins = motion.provenance.get("mirror_twin_after_frames")
