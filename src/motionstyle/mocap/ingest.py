@@ -98,7 +98,7 @@ def ingest_clip(
     """
     skeleton = read_skeleton_map(skeletons, row.skeleton)
     clip = read_clip(path, skeleton_file=skeleton_file, rate_hz=row.rate_hz, cycles=row.cycles)
-    clip = _in_metres_and_upright(_windowed(clip, row), row)
+    clip = _in_metres_and_upright(clip.window(*frame_window(row, clip.frames, clip.source)), row)
     check_joints(clip, skeleton)
     clip = restore_offsets(clip, skeleton.offsets_like)
     clip, warnings = check_clip(
@@ -159,20 +159,26 @@ def ingest_clip(
     return Ingested(motion, report, by_name)
 
 
-def _windowed(clip: SkeletonClip, row: ClipRow) -> SkeletonClip:
-    """Return the frames the sheet asks for."""
+def frame_window(row: ClipRow, frames: int, source: str) -> tuple[int, int]:
+    """Return the first and last frame that the sheet asks for, of a file with `frames` frames.
+
+    Raises
+    ------
+    MotionStyleError
+        If the file ends before the last one, or too few are left.
+    """
     first = row.first_frame or 0
-    last = clip.frames - 1 if row.last_frame is None else row.last_frame
-    if last >= clip.frames:
+    last = frames - 1 if row.last_frame is None else row.last_frame
+    if last >= frames:
         raise MotionStyleError(
-            f"{row.id}: last_frame is {last}, but {clip.source} has frames 0 to {clip.frames - 1}"
+            f"{row.id}: last_frame is {last}, but {source} has frames 0 to {frames - 1}"
         )
     if last - first + 1 < FEWEST_FRAMES:
         raise MotionStyleError(
-            f"{row.id}: frames {first} to {last} of {clip.source} are {max(0, last - first + 1)} "
+            f"{row.id}: frames {first} to {last} of {source} are {max(0, last - first + 1)} "
             f"frames; a motion needs at least {FEWEST_FRAMES}"
         )
-    return clip.window(first, last)
+    return first, last
 
 
 def _in_metres_and_upright(clip: SkeletonClip, row: ClipRow) -> SkeletonClip:

@@ -19,7 +19,7 @@ from motionstyle.body.kinematics import contact_points, forward_kinematics
 from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.c3d import read_c3d, read_c3d_forces
 from motionstyle.mocap.contacts import detect_contacts, ground_height
-from motionstyle.mocap.ingest import FEWEST_FRAMES, Ingested, provenance
+from motionstyle.mocap.ingest import Ingested, frame_window, provenance
 from motionstyle.mocap.marker_body import measure_markers, with_trunk_of
 from motionstyle.mocap.marker_checks import check_clip_of_person, heading
 from motionstyle.mocap.marker_clip import (
@@ -123,7 +123,8 @@ def ingest_markers(
         If a file is malformed or implausible, or does not fit the marker set.
     """
     markers = read_marker_set(markersets, row.skeleton or "")
-    clip = _windowed(read_markers(row, path, markers), row)
+    clip = read_markers(row, path, markers)
+    clip = clip.window(*frame_window(row, clip.frames, clip.source))
     assigned = assign_labels(clip, markers)
     check_clip_of_person(clip, assigned)
     record = read_forces(forces_file, markers, row.up_axis) if forces_file else None
@@ -209,21 +210,6 @@ def placed_forces(motion: Motion, path: str | Path, markers: MarkerSet) -> Force
     if placement is None:
         raise MotionStyleError(f"motion {motion.id}: it does not come from a marker file")
     return Placement.from_json(placement).forces(read_forces(path, markers))
-
-
-def _windowed(clip: MarkerClip, row: ClipRow) -> MarkerClip:
-    first = row.first_frame or 0
-    last = clip.frames - 1 if row.last_frame is None else row.last_frame
-    if last >= clip.frames:
-        raise MotionStyleError(
-            f"{row.id}: last_frame is {last}, but {clip.source} has frames 0 to {clip.frames - 1}"
-        )
-    if last - first + 1 < FEWEST_FRAMES:
-        raise MotionStyleError(
-            f"{row.id}: frames {first} to {last} of {clip.source} are {max(0, last - first + 1)} "
-            f"frames; a motion needs at least {FEWEST_FRAMES}"
-        )
-    return clip.window(first, last)
 
 
 def _placement(clip: MarkerClip, assigned: Assigned, belt: Array) -> Placement:
