@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motionstyle.mocap.floor import runs
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import lowpass
 
 Array = NDArray[np.float64]
 GRAVITY = 9.81
 LOADED_N = 20.0  # a plate bears a foot above this
+CARRIED = 0.5  # share of the weight
 PLATE_CUTOFF_HZ = 20.0
 COMPONENTS = {"vertical": 1, "fore_aft": 0, "lateral": 2}
 FORCE_PLATE_COLUMNS = (
@@ -41,19 +43,29 @@ class FootForce:
         return np.stack(columns, axis=1)
 
 
-def compared_frames(plate: Array, estimated: Array, both: Array) -> NDArray[np.bool_]:
+def compared_frames(
+    plate: Array, estimated: Array, both: Array, weight: float
+) -> NDArray[np.bool_]:
     """Return the frames in which a foot is judged, (F,).
 
-    Where its plate bears it, and where the estimate does within a stance the plates saw: frames
-    in which either is loaded, while the plates together carry the person.
+    Where its plate bears it, and where the estimate does: in a stance that its plate saw, or in
+    one all along which the plates carry the person, so that a load made up in swing counts and a
+    step beside the plates does not.
 
     Parameters
     ----------
     plate, estimated : vertical force of the foot, (F,), N. both : of all plates together, (F,).
+    weight : of the person, N; plates that bear half of it carry the person.
     """
     known = np.isfinite(plate)
-    near = known & (np.nan_to_num(plate) > LOADED_N)
-    return near | (known & (estimated > LOADED_N) & (both > LOADED_N))
+    seen = known & (np.nan_to_num(plate) > LOADED_N)
+    judged = seen.copy()
+    carried = known & (both > CARRIED * weight)
+    for first, last in runs(known & (estimated > LOADED_N)):
+        stance = slice(first, last + 1)
+        if seen[stance].any() or carried[stance].all():
+            judged[stance] = True
+    return judged
 
 
 def force_plate_rows(
@@ -82,7 +94,7 @@ def force_plate_rows(
     for foot, plate in measured.items():
         points = slice(0, 4) if foot == "r" else slice(4, 8)
         estimated = motion.contact_forces[:, points].sum(axis=1)
-        judged = compared_frames(plate[:, 1], estimated[:, 1], both)
+        judged = compared_frames(plate[:, 1], estimated[:, 1], both, weight)
         for component, axis in COMPONENTS.items():
             row: dict[str, object] = {**shared, "foot": foot, "component": component}
             if judged.sum() < 5:

@@ -47,6 +47,7 @@ from motionstyle.mocap.skeleton_map import (
     read_skeleton_map,
     restore_offsets,
 )
+from motionstyle.motion.markers import MarkerPaths
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import lowpass
 
@@ -64,12 +65,14 @@ class Ingested:
     """A motion and what was found on the way to it.
 
     report : numbers and texts by column of `tables/clips.csv`; lengths in the unit of their
-    suffix. marker_rms_cm : by marker name, for the figure of the fit.
+    suffix. marker_rms_cm : by marker name, for the figure of the fit. markers : measured ones
+    of a marker clip, for the physics fit.
     """
 
     motion: Motion
     report: dict[str, Any]
     marker_rms_cm: dict[str, float]
+    markers: MarkerPaths | None = None
 
 
 def ingest_clip(

@@ -44,6 +44,7 @@ from motionstyle.mocap.retarget import fit_legs_to_ground, make_continuous
 from motionstyle.mocap.settings import RetargetSettings, by_action
 from motionstyle.mocap.sheet import ClipRow
 from motionstyle.mocap.trc import UNITS, read_trc
+from motionstyle.motion.markers import MarkerPaths
 from motionstyle.motion.motion import Motion
 
 Array = NDArray[np.float64]
@@ -195,7 +196,17 @@ def ingest_markers(
         "warnings": _remarks(clip, virtual.names, seen),
     }
     rms = 100 * np.sqrt(np.nanmean(distances**2, axis=0))
-    return Ingested(motion, report, {n: float(r) for n, r in zip(virtual.names, rms, strict=True)})
+    by_name = {n: float(r) for n, r in zip(virtual.names, rms, strict=True)}
+    measured = MarkerPaths(
+        names=virtual.names,
+        nodes=virtual.nodes,
+        local=virtual.local,
+        measured=paths,
+        smooth=virtual.world,
+        weights=virtual.weights[..., 0],
+        rate_hz=clip.rate_hz,
+    )
+    return Ingested(motion, report, by_name, measured)
 
 
 def placed_forces(motion: Motion, path: str | Path, markers: MarkerSet) -> ForceRecord:

@@ -97,10 +97,42 @@ class BandedSystem:
             np.add.at(gradient, basis.first + c, local[:, c])
         return band, gradient
 
+    def gather(self, cross: Array) -> Array:
+        """Return per-frame columns over (q, q̇, q̈), (F, 3n, S), over control points, (K·n, S)."""
+        basis, n, columns = self.basis, self.size, cross.shape[2]
+        local = np.einsum(
+            "fdns,fdc->fcns", cross.reshape(len(cross), 3, n, columns), basis.weights
+        )
+        total = np.zeros((basis.controls, n, columns))
+        for c in range(4):
+            np.add.at(total, basis.first + c, local[:, c])
+        return total.reshape(-1, columns)
+
     def solve(self, band: Array, gradient: Array, damping: Array) -> Array:
         """Return −(H + diag(damping))⁻¹ g over control points (K, n)."""
+        return self.solve_bordered(band, gradient, damping, None)[0]
+
+    def solve_bordered(
+        self,
+        band: Array,
+        gradient: Array,
+        damping: Array,
+        border: tuple[Array, Array, Array] | None,
+    ) -> tuple[Array, Array]:
+        """Return the step over control points (K, n) and over S further variables (S,).
+
+        Parameters
+        ----------
+        border : how the S variables meet the control points (K·n, S), their own Hessian (S, S)
+            and gradient (S,); None for none. They are eliminated by their Schur complement.
+        """
         damped = band.copy()
         damped[-1] += damping
         factor = cholesky_banded(damped, check_finite=False)
         step = cho_solve_banded((factor, False), -gradient.ravel(), check_finite=False)
-        return step.reshape(gradient.shape)
+        if border is None:
+            return step.reshape(gradient.shape), np.zeros(0)
+        cross, own, pull = border
+        answer = cho_solve_banded((factor, False), cross, check_finite=False)
+        further = np.linalg.solve(own - cross.T @ answer, -pull - cross.T @ step)
+        return (step - answer @ further).reshape(gradient.shape), further
