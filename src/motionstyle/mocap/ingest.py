@@ -130,7 +130,7 @@ def ingest_clip(
     start, _ = make_continuous(copied_angles(frames, observed))
     coordinates = fit_coordinates(body, smooth, start, observed)
     points = contact_points(body, forward_kinematics(body, coordinates))
-    ground = ground_height(points, clip.rate_hz, level=level)
+    ground = ground_height(points, clip.rate_hz, thresholds, level=level)
     contacts = detect_contacts(points, clip.rate_hz, thresholds, ground)
     coordinates = fit_legs_to_ground(
         body, smooth, coordinates, contacts, ground, clip.rate_hz, cutoff

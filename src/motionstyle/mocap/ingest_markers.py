@@ -157,7 +157,7 @@ def ingest_markers(
     coordinates, virtual = fit_markers(body, virtual, seen, start, observed)
     level = row.surface == "level"
     points = contact_points(body, forward_kinematics(body, coordinates))
-    ground = ground_height(points, clip.rate_hz, level=level)
+    ground = ground_height(points, clip.rate_hz, thresholds, level=level)
     if record is not None and not level:
         ground = _plate_height(points, record, ground)
     contacts = detect_contacts(points, clip.rate_hz, thresholds, ground)

@@ -172,6 +172,7 @@ def set_up(
         prior[6:] = np.maximum(prior[6:], 1 / settings.anchored_rad**2)
     slopes = functions["forces_and_slopes"]
     cone = cone_basis(motion.contact_normals, settings.friction)
+    ground = find_ground(points, motion, round(settings.fade_s * rate))
     basis = SplineBasis.uniform(motion.frames, rate, settings.frames_per_knot)
     parameters = parameter_vector(body)
     return Problem(
@@ -181,9 +182,9 @@ def set_up(
         basis=basis,
         parameters=parameters,
         handles=_virtual(motion, settings) if markers is None else _measured(markers, settings),
-        ground=find_ground(points, motion, round(settings.fade_s * rate)),
+        ground=ground,
         bearing=_spread(motion.contacts, round(settings.spread_s * rate)),
-        prices=_force_prices(points, motion, settings),
+        prices=_force_prices(points, ground, rate, settings),
         cone=cone,
         lift=np.einsum("fpca,fpa->fpc", cone, motion.contact_normals),
         expected=_expected_forces(motion, basis, slopes, parameters),
@@ -213,14 +214,16 @@ def _measured(markers: MarkerPaths, settings: PhysicalSettings) -> Handles:
     )
 
 
-def _force_prices(points: Array, motion: Motion, settings: PhysicalSettings) -> Array:
+def _force_prices(
+    points: Array, ground: Ground, rate_hz: float, settings: PhysicalSettings
+) -> Array:
     """Return what a squared newton of normal force costs at each foot point, (F, 8).
 
     A point that is still settling or already leaving bears little: its price grows with its
     height and speed, so that weight passes along the sole as it does on force plates.
     """
-    speed = np.linalg.norm(np.gradient(points, 1 / motion.rate_hz, axis=0), axis=-1)
-    height = np.maximum(points[..., 1] - points[..., 1].min(axis=0), 0.0)
+    speed = np.linalg.norm(np.gradient(points, 1 / rate_hz, axis=0), axis=-1)
+    height = np.maximum(ground.clearance(points)[0], 0.0)
     unrest = (height / settings.settled_m) ** 2 + (speed / settings.settled_mps) ** 2
     return (1 + unrest) ** 2 / settings.force_n**2
 

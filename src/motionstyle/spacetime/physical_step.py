@@ -112,11 +112,10 @@ def kinematic_costs(problem: Problem, q: Array, shown: Kinematic) -> dict[str, f
     """Return the cost's terms that forces have no part in."""
     settings = problem.settings
     hold = problem.ground.hold[..., None] / settings.slip_m**2
-    free = problem.ground.hold == 0
     return {
         "markers": 0.5 * float((problem.handles.precision[..., None] * shown.misses**2).sum()),
         "held feet": 0.5 * float((hold * shown.held**2).sum()),
-        "sinking": 0.5 * float((shown.sunken[free] ** 2).sum()) / settings.sink_m**2,
+        "sinking": 0.5 * float((shown.sunken**2).sum()) / settings.sink_m**2,
         "joint ranges": 0.5 * float((shown.excess**2).sum()) / settings.range_rad**2,
         "kinematic prior": 0.5 * float((problem.prior_weights * (q - problem.prior) ** 2).sum()),
     }
@@ -291,8 +290,7 @@ def _kinematic_model(
     slope = touch.reshape(frames, -1, COUNT)
     own += np.swapaxes(slope, 1, 2) @ (hold[..., None] * slope)
     pull += np.einsum("fmc,fm->fc", slope, hold * shown.held.reshape(frames, -1))
-    sinking = (problem.ground.hold == 0) & (shown.sunken < 0)
-    lift = sinking / settings.sink_m**2
+    lift = (shown.sunken < 0) / settings.sink_m**2
     climb = np.einsum("fpa,fpac->fpc", shown.normals, touch)
     own += np.swapaxes(climb, 1, 2) @ (lift[..., None] * climb)
     pull += np.einsum("fpc,fp->fc", climb, lift * shown.sunken)

@@ -27,26 +27,23 @@ def expected_shares(bearing: NDArray[np.bool_]) -> Array:
 
     Alone a foot bears all. While both stand, weight passes to the one that came last; NaN where
     markers do not tell how far it has passed: double support cut by the clip's ends, and feet that
-    stand together without either having just come.
+    stand together without one having just come and the other going next.
 
     Parameters
     ----------
     bearing : whether any point of the right and of the left foot bears, (F, 2).
     """
     frames = len(bearing)
-    share = np.zeros((frames, 2))
-    both = bearing.all(axis=1)
-    share[bearing & ~both[:, None]] = 1.0
-    for first, stop in stances(both):
+    share = np.where(bearing, 1.0, 0.0)
+    for first, stop in stances(bearing.all(axis=1)):
+        share[first:stop] = np.nan
         if first == 0 or stop == frames:
-            share[first:stop] = np.nan
             continue
         before, after = bearing[first - 1], bearing[stop]
-        passing = smooth_step((np.arange(first, stop) - first + 0.5) / (stop - first))
-        trailing = 0 if before[0] else 1
-        if before.sum() != 1 or after.sum() != 1 or before[trailing] == after[trailing]:
-            share[first:stop] = np.nan  # the same foot before and after, or none
+        if before.sum() != 1 or after.sum() != 1 or (before == after).all():
             continue
-        share[first:stop, trailing] = 1 - passing
-        share[first:stop, 1 - trailing] = passing
+        trailing = 0 if before[0] else 1
+        passed = smooth_step((np.arange(first, stop) + 0.5 - first) / (stop - first))
+        share[first:stop, trailing] = 1 - passed
+        share[first:stop, 1 - trailing] = passed
     return share
