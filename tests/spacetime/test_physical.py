@@ -11,7 +11,8 @@ from motionstyle.dynamics.inverse import GRAVITY
 from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
-from motionstyle.spacetime.physical import PhysicalSettings, fit_physical
+from motionstyle.spacetime.physical import fit_physical
+from motionstyle.spacetime.physical_problem import PhysicalSettings
 
 
 @pytest.fixture(scope="module")

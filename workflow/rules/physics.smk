@@ -22,11 +22,13 @@ rule dynamics_code:
 rule fit_physical:
     input:
         motion=MOTIONS / "captured/{clip}.npz",
+        markers=RESULTS / "markers/{clip}.npz",
         code=RESULTS / "dynamics/library.json",
     output:
         motion=MOTIONS / "captured/{clip}_physical.npz",
         sidecar=MOTIONS / "captured/{clip}_physical.json",
         report=RESULTS / "physical/{clip}.json",
+        diagnosis=RESULTS / "diagnosis/{clip}.json",
     log:
         LOGS / "fit_physical/{clip}.log",
     benchmark:
@@ -37,7 +39,7 @@ rule fit_physical:
     resources:
         mem_mb=1500,
     params:
-        library=library("body", "motion", "dynamics", "spacetime"),
+        library=library("body", "motion", "mocap", "dynamics", "spacetime"),
         physical=lambda wildcards: {
             **CONFIG["physical"],
             **(CONFIG["force_plates"] if wildcards.clip in PLATES else {}),

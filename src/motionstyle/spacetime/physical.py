@@ -135,9 +135,7 @@ def fit_physical(
     return PhysicalFit(fitted, {**report, **_measures(problem, state)}, diagnosis)
 
 
-def _solve(
-    problem: Problem, log: Callable[[str], None]
-) -> Outcome[tuple[Variables, State]]:
+def _solve(problem: Problem, log: Callable[[str], None]) -> Outcome[tuple[Variables, State]]:
     """Run the multiplier method from the kinematic motion."""
     settings = problem.settings
     variables = Variables(problem.basis.fit(problem.motion.coordinates), problem.shoes)

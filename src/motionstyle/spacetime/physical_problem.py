@@ -36,8 +36,9 @@ class PhysicalSettings:
 
     marker_m : distance of a marker. unobserved_rad, anchored_rad : from the kinematic motion, of
     a coordinate that markers do not show, and of any where measured markers are the target.
-    torque_nm : muscle torque. force_n : normal force at a settled foot point; settled_m and
-    settled_mps say at which height and speed a point is no longer settled and costs more.
+    torque_nm : muscle torque. force_n : normal force at a settled foot point from what it is
+    expected to bear; settled_m and settled_mps say at which height and speed a point is no
+    longer settled and bears less.
     ridge_n : each edge of a friction cone. share_bw : a foot's normal force from what it is
     expected to bear, in body weights. slip_m, sink_m : a bearing point from its place, a free one
     into the ground. range_rad : a joint beyond its range. fade_s : over which the hold on a stance
@@ -51,17 +52,17 @@ class PhysicalSettings:
     unobserved_rad: float = 0.15
     anchored_rad: float = 0.3
     torque_nm: float = 400.0
-    force_n: float = 600.0
+    force_n: float = 1200.0
     ridge_n: float = 5000.0
-    share_bw: float = 0.3
-    slip_m: float = 0.01
-    sink_m: float = 0.005
+    share_bw: float = 0.6
+    slip_m: float = 0.004
+    sink_m: float = 0.002
     range_rad: float = 0.02
     friction: float = 0.8
     settled_m: float = 0.01
     settled_mps: float = 0.3
-    fade_s: float = 0.0
-    spread_s: float = 0.0
+    fade_s: float = 0.05
+    spread_s: float = 0.035
     shoes: bool = True
     shoe_stiffness: float = 20000.0
     shoe_rest_m: float = 0.01
@@ -101,8 +102,9 @@ class Problem:
     """A motion to be fitted. Only the multipliers (`shift`, `root_n`) change while it is solved.
 
     cone : edges of friction cones, (F, 8, 4, 3). lift : their normal components, (F, 8, 4).
-    bearing : which points may push, (F, 8). prices : of a squared newton of normal force, (F, 8).
-    expected : normal force of each foot, (F, 2), N, NaN where nothing is expected. ranges : of
+    bearing : which points may push, (F, 8). prices : of a squared newton of normal force away from
+    what each point is expected to bear, `settled`, both (F, 8). expected : normal force of each
+    foot, (F, 2), N, NaN where nothing is expected. ranges : of
     coordinates, (35, 2). prior_weights : on the distance from the kinematic coordinates, (35,).
     """
 
@@ -118,6 +120,7 @@ class Problem:
     cone: Array
     lift: Array
     expected: Array
+    settled: Array
     ranges: Array
     prior_weights: Array
     shift: Array
@@ -173,8 +176,11 @@ def set_up(
     slopes = functions["forces_and_slopes"]
     cone = cone_basis(motion.contact_normals, settings.friction)
     ground = find_ground(points, motion, round(settings.fade_s * rate))
+    bearing = _spread(motion.contacts, round(settings.spread_s * rate))
     basis = SplineBasis.uniform(motion.frames, rate, settings.frames_per_knot)
     parameters = parameter_vector(body)
+    prices = _force_prices(points, ground, rate, settings)
+    expected, settled = _expected_forces(motion, bearing, prices, basis, slopes, parameters)
     return Problem(
         motion=motion,
         settings=settings,
@@ -183,11 +189,12 @@ def set_up(
         parameters=parameters,
         handles=_virtual(motion, settings) if markers is None else _measured(markers, settings),
         ground=ground,
-        bearing=_spread(motion.contacts, round(settings.spread_s * rate)),
-        prices=_force_prices(points, ground, rate, settings),
+        bearing=bearing,
+        prices=prices,
         cone=cone,
         lift=np.einsum("fpca,fpa->fpc", cone, motion.contact_normals),
-        expected=_expected_forces(motion, basis, slopes, parameters),
+        expected=expected,
+        settled=settled,
         ranges=np.stack([low, high], axis=1),
         prior_weights=prior,
         shift=np.zeros((motion.frames, 6)),
@@ -209,9 +216,7 @@ def _virtual(motion: Motion, settings: PhysicalSettings) -> Handles:
 def _measured(markers: MarkerPaths, settings: PhysicalSettings) -> Handles:
     precision = markers.weights / settings.marker_m**2
     seen = markers.weights > 0
-    return Handles(
-        markers.nodes, markers.local, markers.smooth, precision, markers.measured, seen
-    )
+    return Handles(markers.nodes, markers.local, markers.smooth, precision, markers.measured, seen)
 
 
 def _force_prices(
@@ -223,29 +228,35 @@ def _force_prices(
     height and speed, so that weight passes along the sole as it does on force plates.
     """
     speed = np.linalg.norm(np.gradient(points, 1 / rate_hz, axis=0), axis=-1)
-    height = np.maximum(ground.clearance(points)[0], 0.0)
+    clearance = ground.clearance(points)[0]
+    height = clearance - clearance.min(axis=0)
     unrest = (height / settings.settled_m) ** 2 + (speed / settings.settled_mps) ** 2
     return (1 + unrest) ** 2 / settings.force_n**2
 
 
 def _expected_forces(
-    motion: Motion, basis: SplineBasis, slopes: FrameFunction, parameters: Array
-) -> Array:
-    """Return the normal force each foot is expected to bear, (F, 2), N; NaN where unknown.
+    motion: Motion,
+    bearing: NDArray[np.bool_],
+    prices: Array,
+    basis: SplineBasis,
+    slopes: FrameFunction,
+    parameters: Array,
+) -> tuple[Array, Array]:
+    """Return normal forces to be expected, N: of each foot (F, 2), and of each point (F, 8).
 
-    Weight and acceleration of the kinematic motion, in the splines of the fit, shared by
-    `expected_shares`.
+    What weight and acceleration of the kinematic motion need, in the splines of the fit: shared
+    between the feet by `expected_shares`, NaN where unknown, and between bearing points by the
+    inverse of their prices. Being expected rather than merely cheap, forces keep their sum: a
+    price on the force itself would let the trunk sink to be rid of it.
     """
     q, qd, qdd = basis.evaluate(basis.fit(motion.coordinates))
     needed = slopes(q, qd, qdd, np.zeros((motion.frames, 24)), parameters)[0][:, :3]
-    expected = np.empty((motion.frames, 2))
+    along = np.maximum(np.einsum("fa,fpa->fp", needed, motion.contact_normals), 0.0)
     shares = expected_shares(np.stack([motion.contacts[:, f].any(axis=1) for f in FEET], axis=1))
-    for side, foot in enumerate(FEET):
-        normal = motion.contact_normals[:, foot].mean(axis=1)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        along = np.maximum(np.einsum("fa,fa->f", needed, normal), 0.0)
-        expected[:, side] = shares[:, side] * along
-    return expected
+    feet = np.stack([along[:, f].mean(axis=1) for f in FEET], axis=1) * shares
+    cheap = bearing / prices
+    total = cheap.sum(axis=1, keepdims=True)
+    return feet, along * np.divide(cheap, total, out=np.zeros_like(cheap), where=total > 0)
 
 
 def _spread(mask: NDArray[np.bool_], frames: int) -> NDArray[np.bool_]:

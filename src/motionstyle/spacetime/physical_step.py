@@ -20,7 +20,7 @@ from motionstyle.dynamics.inverse import GRAVITY
 from motionstyle.dynamics.shoes import Shoes
 from motionstyle.spacetime.forces import Eliminated, eliminate_forces
 from motionstyle.spacetime.physical_problem import COUNT, FEET, Problem
-from motionstyle.spacetime.splines import BandedSystem
+from motionstyle.spacetime.splines import BandedSystem, Border
 
 Array = NDArray[np.float64]
 POINTS = len(CONTACT_POINTS)
@@ -42,13 +42,18 @@ class Variables:
     shoes: Shoes | None
 
     def moved(self, step: Array, shoe_step: Array) -> Variables:
-        """Return the variables after a step; shoes stay within their bounds."""
+        """Return the variables after a step."""
         shoes = self.shoes
         if shoes is not None:
-            stiffness = np.clip(shoes.stiffness + shoe_step[0], 0.0, STIFFEST)
-            rest = np.clip(shoes.rest_length + shoe_step[1], 0.0, LONGEST_REST)
+            stiffness, rest = shoes.stiffness + shoe_step[0], shoes.rest_length + shoe_step[1]
             shoes = Shoes(float(stiffness), float(rest))
         return Variables(self.controls + step, shoes)
+
+    def room(self) -> tuple[Array, Array]:
+        """Return how far the shoes may go down and up, in units of `SHOE_SCALE`, two of (2,)."""
+        shoes = self.shoes or Shoes(0.0, 0.0)
+        here = np.array([shoes.stiffness, shoes.rest_length]) / SHOE_SCALE
+        return -here, np.array([STIFFEST, LONGEST_REST]) / SHOE_SCALE - here
 
 
 @dataclass(frozen=True)
@@ -73,8 +78,12 @@ class State:
 
 @dataclass(frozen=True)
 class Kinematic:
-    """What the pose alone says: misses of markers (F, M, 3), m, of held foot points (F, 8, 3), m,
-    sinking of free ones (F, 8), m, and excess over joint ranges (F, 35)."""
+    """What the pose alone says.
+
+    points : of the feet, (F, 8, 3), m. misses : of markers, (F, M, 3), m. held : of foot points
+    from where stances hold them, (F, 8, 3), m. clearance, normals : above the ground, (F, 8), m,
+    and its normals, (F, 8, 3). excess : over joint ranges, (F, 35).
+    """
 
     pose: Pose
     points: Array
@@ -194,6 +203,7 @@ def evaluate(problem: Problem, variables: Variables) -> State:
     residuals[:, :COUNT] *= scale
     borne = np.stack([normal_shoe[:, foot].sum(axis=1) for foot in FEET], axis=1)
     residuals[:, SHARE_ROWS] = (borne - expected) * share_scale
+    residuals[:, POINT_ROWS] = -problem.settled * np.sqrt(problem.prices)
     ridge = np.full((frames, 4 * POINTS), problem.settings.ridge_n**-2.0)
     solved = eliminate_forces(residuals, _columns(problem, by_force), problem.bearing, ridge)
     lambdas = solved.coefficients.reshape(frames, POINTS, 4)
@@ -317,15 +327,21 @@ def step(problem: Problem, variables: Variables, state: State, damping: float) -
     model = _model(problem, variables, state)
     system = BandedSystem(problem.basis, COUNT)
     band, gradient = system.assemble(model.hessians, model.gradients)
-    border = None
+    border, shoe_move = None, np.zeros(2)
     if variables.shoes is not None:
-        border = (system.gather(model.shoe_cross), model.shoe_hessian, model.shoe_gradient)
+        border = Border(
+            system.gather(model.shoe_cross),
+            model.shoe_hessian,
+            model.shoe_gradient,
+            variables.room(),
+        )
     metric = np.full(band.shape[1], 1 / problem.settings.marker_m**2)
     promised = 0.0
     while damping < LARGEST_DAMPING:
-        move, shoe_move = system.solve_bordered(band, gradient, damping * metric, border)
         if border is None:
-            shoe_move = np.zeros(2)
+            move = system.solve(band, gradient, damping * metric)
+        else:
+            move, shoe_move = system.solve_bordered(band, gradient, damping * metric, border)
         slope = -float((gradient * move).sum()) - float(model.shoe_gradient @ shoe_move)
         promised = max(promised, 0.5 * slope)
         trial = variables.moved(move, shoe_move * SHOE_SCALE)
