@@ -1,5 +1,15 @@
 # Generated dynamics, and motions that obey Newton.
 
+from motionstyle.evaluation.force_study import read_study
+
+# Variants of the physics fit's settings, and the clips on which they are compared.
+try:
+    FORCE_STUDY = read_study(located("config/force_study.yaml"))
+except MotionStyleError as error:
+    raise WorkflowError(str(error)) from None
+STUDIED = [id for id in FORCE_STUDY["development"] if id in PLATES]
+TABLES += [RESULTS / "tables/force_plate_study.csv"] if STUDIED else []
+
 
 rule dynamics_code:
     output:
@@ -123,3 +133,30 @@ rule figure_force_plates:
         library=library("evaluation", "figures"),
     script:
         "../scripts/figure_force_plates.py"
+
+
+rule force_study:
+    input:
+        motions=[MOTIONS / f"captured/{id}.npz" for id in STUDIED],
+        markers=[RESULTS / f"markers/{id}.npz" for id in STUDIED],
+        forces=[companion(id, "forces")[0] for id in STUDIED],
+        maps=[map_file(CLIPS[id]) for id in STUDIED],
+        code=RESULTS / "dynamics/library.json",
+    output:
+        table=RESULTS / "tables/force_plate_study.csv",
+    log:
+        LOGS / "force_study.log",
+    benchmark:
+        BENCHMARKS / "force_study.tsv"
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        library=library("body", "motion", "mocap", "dynamics", "spacetime", "evaluation"),
+        study=FORCE_STUDY,
+        clips=STUDIED,
+        physical={**CONFIG["physical"], **CONFIG["force_plates"]},
+    script:
+        "../scripts/force_study.py"
