@@ -104,6 +104,19 @@ def test_ground_under_steps_is_the_step():
     assert len(runs(flat[:, 0])) == 1  # only the lowest stair is at the level of the floor
 
 
+def test_going_down_a_foot_stands_on_its_step_until_it_leaves_it():
+    """Half a second later the point rests a stair lower; that is not yet its ground."""
+    points, stand = stairs()
+    down = points[::-1].copy()
+    stand = stand[::-1]
+    ground = ground_height(down, RATE, WALK, level=False)
+    np.testing.assert_allclose(ground[stand], down[..., 1][stand], atol=0.01)
+    found = detect_contacts(down, RATE, WALK, ground)
+    for (a, b), (c, d) in zip(runs(found[:, 0]), runs(stand), strict=True):
+        assert abs(a - c) <= 3
+        assert abs(b - d) <= 3
+
+
 @pytest.mark.parametrize("rate", [60.0, 100.0, 120.0])
 def test_strikes_and_lifts_of_a_known_walk(plain_body, rate):
     walk = known_gait(plain_body, rate_hz=rate)
