@@ -140,12 +140,12 @@ def _solve(problem: Problem, log: Callable[[str], None]) -> Outcome[tuple[Variab
     settings = problem.settings
     variables = Variables(problem.basis.fit(problem.motion.coordinates), problem.shoes)
     state = evaluate(problem, variables)
-    damping, iterations, promised, converged = 1e-3, 0, np.inf, False
+    damping, iterations, promised = 1e-3, 0, np.inf
     for outer in range(settings.outer):
         for _ in range(settings.inner):
             iterations += 1
             taken = step(problem, variables, state, damping)
-            fall = (state.cost - taken.state.cost) / max(state.cost, 1e-12)
+            fall = (state.cost - taken.state.cost) / problem.motion.frames
             promised = taken.promised / max(state.cost, 1e-12)
             variables, state, damping = taken.variables, taken.state, taken.damping
             if fall < settings.tolerance:
@@ -153,13 +153,13 @@ def _solve(problem: Problem, log: Callable[[str], None]) -> Outcome[tuple[Variab
         rms = _rms(state.root[:, :3])
         log(f"outer {outer}: cost {state.cost:.4f}, root force {rms:.3f} N rms")
         if rms < settings.root_goal_n:
-            converged = True
             break
         tighter = max(problem.root_n * settings.root_shrink, settings.root_least_n)
         multiplier = (problem.shift + state.root) / problem.root_n**2
         problem.root_n, problem.shift = tighter, multiplier * tighter**2
         state = evaluate(problem, variables)
         damping = min(damping, 1.0)
+    converged = _rms(state.root[:, :3]) < settings.root_goal_n
     shown = kinematic(problem, state.coordinates)
     terms = {**kinematic_costs(problem, state.coordinates, shown), **force_costs(problem, state)}
     message = "" if converged else f"root force {_rms(state.root[:, :3]):.2f} N rms, not settled"

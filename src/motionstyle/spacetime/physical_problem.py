@@ -45,6 +45,8 @@ class PhysicalSettings:
     comes and goes. spread_s : by which stances are widened for forces. shoe_stiffness,
     shoe_rest_m : of eq. (9), to start from and as wide a prior; shoes : whether there are any.
     root_* : the multiplier method's allowed root residual, N and N·m, from first to least.
+    outer, inner : rounds of it, and steps in each; a round ends when the cost falls by less than
+    `tolerance` a frame.
     """
 
     frames_per_knot: float = 2.0
@@ -72,7 +74,7 @@ class PhysicalSettings:
     root_goal_n: float = 0.1
     outer: int = 16
     inner: int = 8
-    tolerance: float = 1e-3
+    tolerance: float = 2e-3
 
 
 def settings_from(config: Mapping[str, Any]) -> PhysicalSettings:

@@ -31,7 +31,7 @@ POINT_ROWS = slice(COUNT + len(FEET), COUNT + len(FEET) + POINTS)
 ROWS = POINT_ROWS.stop
 LARGEST_DAMPING = 1e6
 STIFFEST, LONGEST_REST = 1e5, 0.04  # N/m and m, of a shoe
-SHOE_SCALE = np.array([2e4, 0.01])
+SHOE_SCALE = np.array([1e4, 0.003])  # how far shoes are likely from those to start from
 
 
 @dataclass(frozen=True)
