@@ -42,6 +42,7 @@ from motionstyle.spacetime.physical_step import (
 
 Array = NDArray[np.float64]
 ROOT_WEIGHT = 100.0  # w_r of eq. (13)
+FEWEST_STUCK = 3  # rounds without any step that lowers the cost, before giving up
 ROOT_ROWS = tuple(f"root {kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 # Up to which a violation is fine, for the diagnosis.
 SLIP_LIMIT_M, SINK_LIMIT_M, RANGE_LIMIT_RAD = 0.01, 0.005, 0.02
@@ -140,8 +141,9 @@ def _solve(problem: Problem, log: Callable[[str], None]) -> Outcome[tuple[Variab
     settings = problem.settings
     variables = Variables(problem.basis.fit(problem.motion.coordinates), problem.shoes)
     state = evaluate(problem, variables)
-    damping, iterations, promised = 1e-3, 0, np.inf
+    damping, iterations, promised, stuck = 1e-3, 0, np.inf, 0
     for outer in range(settings.outer):
+        before = state
         for _ in range(settings.inner):
             iterations += 1
             taken = step(problem, variables, state, damping)
@@ -152,7 +154,8 @@ def _solve(problem: Problem, log: Callable[[str], None]) -> Outcome[tuple[Variab
                 break
         rms = _rms(state.root[:, :3])
         log(f"outer {outer}: cost {state.cost:.4f}, root force {rms:.3f} N rms")
-        if rms < settings.root_goal_n:
+        stuck = stuck + 1 if state is before else 0
+        if rms < settings.root_goal_n or stuck == FEWEST_STUCK:
             break
         tighter = max(problem.root_n * settings.root_shrink, settings.root_least_n)
         multiplier = (problem.shift + state.root) / problem.root_n**2
