@@ -91,7 +91,7 @@ def fit_markers(
     q = fit_coordinates(body, markers, start, observed, iterations=60)
     spine = observed[COORDINATE_INDEX["thorax_flexion"]]
     for iterations in (40, 30):
-        q = fit_coordinates(body, markers, _reseeded(q, observed), observed, iterations=iterations)
+        q = fit_coordinates(body, markers, reseeded(q, observed), observed, iterations=iterations)
         markers = with_own_offsets(body, markers, q, seen)
         held = markers.joined(_spine_markers(body, q)) if spine else markers
         q = fit_coordinates(body, held, q, observed, iterations=iterations)
@@ -120,7 +120,7 @@ def start_coordinates(
     return make_continuous(start)[0]
 
 
-def _reseeded(coordinates: Array, observed: NDArray[np.bool_]) -> Array:
+def reseeded(coordinates: Array, observed: NDArray[np.bool_]) -> Array:
     """Return coordinates in which limbs of impossible frames follow the nearest possible ones.
 
     An arm is impossible where its elbow bends the wrong way or its shoulder turns by half a turn;
