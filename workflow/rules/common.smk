@@ -146,7 +146,10 @@ def motion_files():
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
 TABLES = [
     RESULTS / f"tables/{name}.csv"
-    for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
+    for name in (
+        *("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates"),
+        *("joint_moments", "plate_moments"),
+    )
 ]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
@@ -156,7 +159,8 @@ SHOWN = {
 }
 FIGURES = ["body", "strips", "gait", "markers"]
 FIGURES += ["planted"] if PLANTED else []
-FIGURES += ["force_plates"] if PLATES else []
+FIGURES += ["force_plates", "plate_moments"] if PLATES else []
+FIGURES += ["joint_moments"] if PHYSICAL else []
 
 
 def everything():
@@ -165,4 +169,10 @@ def everything():
     figures = [RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")]
     quality = [RESULTS / f"quality/{id}.json" for id in CLIPS]
     sidecars = [file.with_suffix(".json") for file in motions]
-    return [*TABLES, RESULTS / "tables/claims.csv", *figures, *quality, *motions, *sidecars]
+    opensim = [
+        RESULTS / f"opensim/captured/{id}_physical_{ending}"
+        for id in PLATES
+        for ending in ("angles.mot", "moments.sto", "grf.mot", "external_loads.xml")
+    ]
+    made = [*figures, *quality, *motions, *sidecars, *opensim]
+    return [*TABLES, RESULTS / "tables/claims.csv", *made]

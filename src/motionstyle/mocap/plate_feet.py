@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.body.kinematics import contact_points
 from motionstyle.body.layout import CONTACT_POINTS
 from motionstyle.mocap.floor import runs
+from motionstyle.mocap.ingest_markers import placed_forces
 from motionstyle.mocap.marker_clip import ForceRecord
-from motionstyle.mocap.markerset import Plates
+from motionstyle.mocap.markerset import Plates, read_marker_set
 from motionstyle.mocap.mot import LOADED_N
 from motionstyle.motion.motion import Motion
 
@@ -26,6 +30,25 @@ def middle_of_feet(motion: Motion) -> Array:
         ball = [CONTACT_POINTS.index(f"ball_{s}_{side}") for s in ("medial", "lateral")]
         feet.append((heel + points[:, ball].mean(axis=1)) / 2)
     return np.stack(feet, axis=1)
+
+
+def plates_by_foot(motion: Motion, forces_file: str | Path, marker_set: str | Path) -> ForceRecord:
+    """Return the measured force on each foot in a motion's frame, t = 0 at its first frame.
+
+    Parameters
+    ----------
+    motion : from a marker file, perhaps cut since. marker_set : its YAML file.
+
+    Raises
+    ------
+    MotionStyleError
+        If the plates cannot be read, or the motion does not come from markers.
+    """
+    markers = read_marker_set(Path(marker_set).parent, Path(marker_set).stem)
+    record = placed_forces(motion, forces_file, markers)
+    cut = motion.provenance.get("cut_start_s", 0.0)
+    record = replace(record, start_s=record.start_s - cut)
+    return forces_by_foot(motion, record, markers.plates(forces_file))
 
 
 def forces_by_foot(motion: Motion, record: ForceRecord, plates: Plates) -> ForceRecord:
