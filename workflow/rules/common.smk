@@ -136,6 +136,11 @@ def companion(id, kind):
     return [source_file(CLIPS[id], name)] if name else []
 
 
+def physical_settings(id):
+    """Return the settings of a clip's physics fit."""
+    return {**CONFIG["physical"], **(CONFIG["force_plates"] if id in PLATES else {})}
+
+
 def motion_files():
     """Return the files of every motion of this run."""
     captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
@@ -148,7 +153,7 @@ TABLES = [
     RESULTS / f"tables/{name}.csv"
     for name in (
         *("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates"),
-        *("joint_moments", "plate_moments"),
+        *("joint_moments", "plate_moments", "root_residual"),
     )
 ]
 
@@ -157,10 +162,11 @@ SHOWN = {
     figure: [id for id in ids if id in CLIPS] or list(CLIPS)[:4]
     for figure, ids in CONFIG["figures"].items()
 }
-FIGURES = ["body", "strips", "gait", "markers"]
+FORCE_STRIPS = [id for id in CONFIG["figures"].get("forces", []) if id in PHYSICAL] or PHYSICAL[:4]
+FIGURES = ["body", "strips", "gait", "markers", "marker_fit"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates", "plate_moments"] if PLATES else []
-FIGURES += ["joint_moments"] if PHYSICAL else []
+FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else []
 
 
 def everything():

@@ -1,4 +1,4 @@
-# What physical motions are good for: joint moments, exports for OpenSim, figures of forces.
+# What physical motions are good for: joint moments, exports for OpenSim, figures of fit and force.
 
 
 rule joint_moments:
@@ -59,6 +59,91 @@ use rule figure_joint_moments as figure_plate_moments with:
     params:
         library=library("evaluation", "figures"),
         show="stances",
+
+
+rule root_residual:
+    input:
+        kinematic=[MOTIONS / f"captured/{id}.npz" for id in PHYSICAL],
+        physical=[MOTIONS / f"captured/{id}_physical.npz" for id in PHYSICAL],
+        reports=[RESULTS / f"physical/{id}.json" for id in PHYSICAL],
+        code=RESULTS / "dynamics/library.json",
+    output:
+        table=RESULTS / "tables/root_residual.csv",
+    log:
+        LOGS / "root_residual.log",
+    benchmark:
+        BENCHMARKS / "root_residual.tsv"
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "dynamics", "spacetime", "evaluation"),
+        config=CONFIG["name"],
+        settings={id: physical_settings(id) for id in PHYSICAL},
+    script:
+        "../scripts/root_residual.py"
+
+
+rule figure_root_residual:
+    input:
+        table=RESULTS / "tables/root_residual.csv",
+    output:
+        svg=RESULTS / "figures/root_residual.svg",
+        png=RESULTS / "figures/root_residual.png",
+    log:
+        LOGS / "figures/root_residual.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("figures"),
+    script:
+        "../scripts/figure_root_residual.py"
+
+
+rule figure_force_strips:
+    input:
+        motions=[MOTIONS / f"captured/{id}_physical.npz" for id in FORCE_STRIPS],
+        reports=[RESULTS / f"physical/{id}.json" for id in FORCE_STRIPS],
+    output:
+        svg=RESULTS / "figures/force_strips.svg",
+        png=RESULTS / "figures/force_strips.png",
+    log:
+        LOGS / "figures/force_strips.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "evaluation", "figures"),
+    script:
+        "../scripts/figure_force_strips.py"
+
+
+rule figure_marker_fit:
+    input:
+        quality=[RESULTS / f"quality/{id}.json" for id in CLIPS],
+        maps=sorted({str(map_file(row)) for row in CLIPS.values() if is_markers(row)}),
+    output:
+        svg=RESULTS / "figures/marker_fit.svg",
+        png=RESULTS / "figures/marker_fit.png",
+    log:
+        LOGS / "figures/marker_fit.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("mocap", "evaluation", "figures"),
+        sets=[str(map_file(row)) if is_markers(row) else "" for row in CLIPS.values()],
+    script:
+        "../scripts/figure_marker_fit.py"
 
 
 rule opensim_angles:

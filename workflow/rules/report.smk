@@ -146,7 +146,7 @@ rule publish:
             RESULTS / f"tables/{name}.csv"
             for name in (
                 *("body", "clips", "gait_angles", "gait", "claims"),
-                *("physical", "force_plates", "joint_moments", "plate_moments"),
+                *("physical", "force_plates", "joint_moments", "plate_moments", "root_residual"),
             )
         ],
         figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],

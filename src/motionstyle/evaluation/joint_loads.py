@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_lsq_spline
 
 from motionstyle.body.kinematics import MOVES_WITH, coordinate_axes
 from motionstyle.body.layout import (
@@ -30,11 +30,10 @@ from motionstyle.motion.opensim_export import (
     cardan_axes,
     need_forces,
 )
-from motionstyle.spacetime.splines import SplineBasis
 
 Array = NDArray[np.float64]
-FINEST_KNOT = 2.0  # frames; coarser splines whose knots are some of these are held as well
-HELD_TO = 1e-4  # m or rad
+FINEST_KNOT = 2  # frames; coarser splines whose knots are some of these are held as well
+HELD_TO = 1e-5  # m or rad
 
 
 @dataclass(frozen=True)
@@ -75,14 +74,17 @@ def spline_rates(motion: Motion) -> tuple[Array, Array, Array]:
     spline holds the frames, its derivatives are exact. Others are joined by the cubic spline
     through all frames.
     """
-    q = motion.coordinates
-    if motion.frames > 2 * FINEST_KNOT:
-        basis = SplineBasis.uniform(motion.frames, motion.rate_hz, FINEST_KNOT)
-        held, rates, bends = basis.evaluate(basis.fit(q))
-        if np.abs(held - q).max() < HELD_TO:
-            return q, rates, bends
-    spline = CubicSpline(motion.times, q, axis=0)
-    return q, spline(motion.times, 1), spline(motion.times, 2)
+    q, places = motion.coordinates, np.arange(motion.frames)
+    spline = CubicSpline(places, q, axis=0)
+    if motion.frames > 4 * FINEST_KNOT:
+        end = -(-places[-1] // FINEST_KNOT) * FINEST_KNOT
+        inner = np.arange(FINEST_KNOT, end, FINEST_KNOT)
+        knots = np.concatenate([np.zeros(4), inner, np.full(4, end)])
+        fitted = make_lsq_spline(places, q, knots, k=3)
+        if np.abs(fitted(places) - q).max() < HELD_TO:
+            spline = fitted
+    rate = motion.rate_hz
+    return q, rate * spline(places, 1), rate**2 * spline(places, 2)
 
 
 def joint_loads(

@@ -12,13 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from motionstyle.evaluation.normative import Normative
+from motionstyle.evaluation.normative import Band, Normative
 from motionstyle.figures.style import BAND, LEFT, RIGHT, blank_figure, new_figure, styled
 
 Array = NDArray[np.float64]
 PERCENT = np.linspace(0, 100, 101)
 BAR_WIDTH_PCT = 5.0
-JOINT_TITLES = ("hip (flexors +)", "knee (flexors +)", "ankle (dorsiflexors +)")
+JOINT_TITLES = ("hip, flexion +", "knee, flexion +", "ankle, dorsiflexion +")
 OWN, PLATE, SINGLE, EDGE = "#000000", "#009E73", "#AAAAAA", "#CC79A7"
 
 
@@ -28,15 +28,24 @@ def _cycles(clips: list[Mapping[str, Any]], source: str, joint: str) -> Array:
     return np.array(found).reshape(len(found), 101)
 
 
-def _panel(axes: Axes, clips: list[Mapping[str, Any]], joint: str) -> None:
+def _panel(
+    axes: Axes, clips: list[Mapping[str, Any]], joint: str, bands: Mapping[int, Band]
+) -> None:
+    """Draw the bands as bars, the clips' cycles and their medians."""
+    for percent, band in bands.items():
+        bar = (percent, band.high - band.low, BAR_WIDTH_PCT, band.low)
+        axes.bar(*bar, color=BAND, zorder=0)
+        axes.bar(*bar, fill=False, edgecolor=EDGE, linewidth=0.9, zorder=4)
+        ends = [percent - BAR_WIDTH_PCT / 2, percent + BAR_WIDTH_PCT / 2]
+        axes.plot(ends, [band.midpoint] * 2, color=EDGE, lw=0.9, zorder=4)
     own, plate = (_cycles(clips, source, joint) for source in ("estimated", "measured"))
     axes.plot(PERCENT, own.T, color=SINGLE, linewidth=0.4, alpha=0.7)
     for cycles, colour, style in ((own, OWN, "-"), (plate, PLATE, (0, (4, 1.5)))):
         if len(cycles):
             axes.plot(PERCENT, np.median(cycles, axis=0), color=colour, linestyle=style, lw=1.6)
-    if len(own):
-        low, high = np.percentile(own, [2, 98])
-        axes.set_ylim(low - 0.5, high + 0.5)
+    low, high = np.percentile(own, [1, 99])
+    edges = [edge for band in bands.values() for edge in (band.low, band.high)]
+    axes.set_ylim(min([low, *edges]) - 0.2, max([high, *edges]) + 0.2)
     axes.axhline(0, color="black", linewidth=0.4)
     axes.set_xlim(-4, 104)
     axes.set_xticks([0, 25, 50, 75, 100])
@@ -51,7 +60,7 @@ def joint_moment_figure(clips: Mapping[str, Mapping[str, Any]], normative: Norma
     clips : by id, of `evaluation.joint_moments.cycle_curves`.
     """
     kinds = [
-        ("level walks", [c for c in clips.values() if c["level_walk"]]),
+        ("walks", [c for c in clips.values() if c["level_walk"]]),
         ("runs", [c for c in clips.values() if c["action"].startswith(("run", "dash"))]),
     ]
     kinds = [(name, some) for name, some in kinds if len(_cycles(some, "estimated", "hip"))]
@@ -61,29 +70,22 @@ def joint_moment_figure(clips: Mapping[str, Mapping[str, Any]], normative: Norma
     grid = figure.subplots(len(kinds), 3, squeeze=False)
     for row, (name, some) in zip(grid, kinds, strict=True):
         for axes, joint, title in zip(row, normative.moments, JOINT_TITLES, strict=True):
-            if name == "level walks":
-                for percent, band in normative.moments[joint].items():
-                    width = BAR_WIDTH_PCT
-                    size = (percent, band.high - band.low, width, band.low)
-                    axes.bar(*size, color=BAND, zorder=0)
-                    axes.bar(*size, fill=False, edgecolor=EDGE, linewidth=0.9, zorder=4)
-                    ends = [percent - width / 2, percent + width / 2]
-                    axes.plot(ends, [band.midpoint] * 2, color=EDGE, lw=0.9, zorder=4)
-            _panel(axes, some, joint)
+            _panel(axes, some, joint, normative.moments[joint] if name == "walks" else {})
             axes.set_title(f"{name}: {title}", loc="left")
         sides = len(_cycles(some, "estimated", "hip"))
         seen = len(_cycles(some, "measured", "hip"))
-        row[0].set_ylabel(f"moment, N·m/kg\n({sides} legs, {seen} on plates)")
+        legs = f"(legs: {sides}, on plates: {seen})" if seen else f"(legs: {sides})"
+        row[0].set_ylabel(f"moment, N·m/kg\n{legs}")
     for axes in grid[-1]:
         axes.set_xlabel("cycle from heel strike, %")
     handles = [
         Patch(facecolor=BAND, edgecolor=EDGE, label="published 2.5–97.5 %, midpoint"),
         Line2D([], [], color=SINGLE, label="one leg of a clip, estimated forces"),
         Line2D([], [], color=OWN, lw=1.6, label="their median"),
-        Line2D(
-            [], [], color=PLATE, linestyle=(0, (4, 1.5)), lw=1.6, label="median, plates' forces"
-        ),
     ]
+    if any(len(_cycles(some, "measured", "hip")) for _name, some in kinds):
+        dashes = (0, (4, 1.5))
+        handles += [Line2D([], [], color=PLATE, ls=dashes, lw=1.6, label="median, plates' forces")]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
