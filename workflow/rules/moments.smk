@@ -186,3 +186,24 @@ rule opensim_forces:
         allow_failed=lambda wildcards: wildcards.id.removesuffix("_physical") in PLATES,
     script:
         "../scripts/opensim_forces.py"
+
+
+# On demand, and for publishing: times differ from run to run, so no default output holds them.
+rule benchmark_dynamics:
+    input:
+        motions=[MOTIONS / f"captured/{id}.npz" for id in list(CLIPS)[:3]],
+        code=RESULTS / "dynamics/library.json",
+    output:
+        table=RESULTS / "tables/benchmark_dynamics.csv",
+    log:
+        LOGS / "benchmark_dynamics.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "dynamics"),
+        sizes={"frames": 2000, "rounds": 15, "seed": 1},
+    script:
+        "../scripts/benchmark_dynamics.py"
