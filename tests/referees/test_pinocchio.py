@@ -15,6 +15,7 @@ pin = pytest.importorskip("pinocchio")
 def test_forces_equal_pinocchio(plain_body):
     functions = load_functions(dynamics_functions(), None)
     model, _ = pinocchio_model(pin, plain_body)
+    np.testing.assert_array_equal(model.gravity.linear, [0, -9.81, 0])
     data = model.createData()
     rng = np.random.default_rng(11)
     for _ in range(20):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from motionstyle.mocap.text import Problems, tidy_rate
 from motionstyle.mocap.trc import UNITS
 
 Array = NDArray[np.float64]
+_BLOCK, _MIPS = 512, 86  # bytes of a block of the file; processor type with the other byte order
 FORCE_UNITS = {"N": 1.0, "kN": 1000.0}
 MOMENT_UNITS = {"Nmm": 1e-3, "Nm": 1.0, "Ncm": 1e-2}
 _UP = 2  # C3D laboratories measure height along z
@@ -31,8 +33,7 @@ def _open(path: Path, *, plates: bool) -> Any:  # noqa: ANN401 (ezc3d has no typ
         If the file cannot be read or ezc3d refuses it.
     """
     try:
-        with path.open("rb") as file:
-            start = file.read(2)
+        start = _first_bytes(path)
     except OSError as error:
         raise MotionStyleError(
             f"{path}: cannot read this C3D file ({error.strerror or error})"
@@ -40,9 +41,34 @@ def _open(path: Path, *, plates: bool) -> Any:  # noqa: ANN401 (ezc3d has no typ
     if len(start) < 2 or start[1] != 0x50:
         raise MotionStyleError(f"{path}: not a C3D file (its second byte is not 0x50)")
     try:
-        return ezc3d.c3d(str(path), extract_forceplat_data=plates)
+        file = ezc3d.c3d(str(path), extract_forceplat_data=plates)
     except Exception as error:
         raise MotionStyleError(f"{path}: ezc3d cannot read this C3D file: {error}") from error
+    declared, found = _declared_frames(path, start), file["data"]["points"].shape[2]
+    if declared is not None and declared > found:
+        raise MotionStyleError(
+            f"{path}: its header declares {declared} frames, but {found} follow; is the file cut "
+            "off? Copy it again"
+        )
+    return file
+
+
+def _first_bytes(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_BLOCK)
+
+
+def _declared_frames(path: Path, header: bytes) -> int | None:
+    """Return how many frames the header declares; None where it cannot hold their number.
+
+    ezc3d reads a file that ends too early as if it had been shorter, and says so nowhere.
+    """
+    with path.open("rb") as file:
+        file.seek((header[0] - 1) * _BLOCK + 3)
+        processor = file.read(1)
+    order = ">" if processor == bytes([_MIPS]) else "<"
+    first, last = struct.unpack(f"{order}HH", header[6:10])
+    return last - first + 1 if 0 < first <= last < 0xFFFF else None
 
 
 def _parameter(file: Any, group: str, name: str, default: object = None) -> Any:  # noqa: ANN401

@@ -21,7 +21,7 @@ from motionstyle.mocap.c3d import read_c3d, read_c3d_forces
 from motionstyle.mocap.contacts import detect_contacts, ground_height
 from motionstyle.mocap.ingest import Ingested, frame_window, provenance
 from motionstyle.mocap.marker_body import measure_markers, with_trunk_of
-from motionstyle.mocap.marker_checks import check_clip_of_person, heading
+from motionstyle.mocap.marker_checks import check_clip_of_person, check_plates, heading
 from motionstyle.mocap.marker_clip import (
     ForceRecord,
     MarkerClip,
@@ -128,6 +128,8 @@ def ingest_markers(
     assigned = assign_labels(clip, markers)
     check_clip_of_person(clip, assigned)
     record = read_forces(forces_file, markers, row.up_axis) if forces_file else None
+    if record is not None:
+        check_plates(clip, assigned, record)
     sex: Sex = row.sex or default_sex
     thresholds = by_action(settings.thresholds, row.action)
     belt = belt_velocity(clip, assigned) if markers.on_treadmill(row.path) else np.zeros(3)

@@ -1,18 +1,21 @@
-"""Checks of a marker clip against the human body: its unit, and right and left."""
+"""Checks of a marker clip against the human body: unit, front and back, right and left, plates."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.marker_clip import MarkerClip
+from motionstyle.mocap.marker_clip import ForceRecord, MarkerClip
 from motionstyle.mocap.marker_joints import pelvis_frame
 from motionstyle.mocap.markerset import LANDMARKS, Assigned
 from motionstyle.mocap.sheet import METRES
 
 Array = NDArray[np.float64]
 PELVIS_WIDTH_M = (0.15, 0.42)  # between the ASIS of anyone older than a small child
+NEAR_PLATE_M = 1.5  # farther than a foot of a person ever stands from the pelvis
 SWAPPED_M = 0.02  # a pair is swapped if its right marker lies this far to the left of the left one
 HANGING = 0.5  # least cosine between the vertical and the line from feet to pelvis
 
@@ -69,6 +72,71 @@ def check_upright(clip: MarkerClip, assigned: Assigned) -> None:
         )
 
 
+def check_front(clip: MarkerClip, assigned: Assigned) -> None:
+    """Refuse a clip whose feet point to the back of its pelvis: front and back are swapped.
+
+    Raises
+    ------
+    MotionStyleError
+        If both feet do on the median.
+    """
+    points = {name: clip.path(label) for name, label in assigned.landmarks.items()}
+    forward = _pelvis_forward(points)
+    backward = []
+    for side in "rl":
+        found = [points.get(f"{name}_{side}") for name in ("toe", "mtp_lateral", "mtp_medial")]
+        toe = next(path for path in found if path is not None)
+        foot = (toe - points[f"heel_{side}"]) * [1, 0, 1]
+        cosine = (foot * forward).sum(axis=1)
+        cosine /= np.linalg.norm(foot, axis=1) * np.linalg.norm(forward, axis=1)
+        backward.append(np.isfinite(cosine).any() and np.nanmedian(cosine) < -HANGING)
+    if all(backward):
+        front, back = (
+            " and ".join(f"'{assigned.landmarks[n]}'" for n in names if n in assigned.landmarks)
+            for names in (("asis_r", "asis_l"), ("psis_r", "psis_l", "sacrum"))
+        )
+        raise MotionStyleError(
+            f"{clip.source}: both feet point to the back of the pelvis: its front markers {front} "
+            f"and its back ones {back} are exchanged, or those of heels and toes; exchange the "
+            "labels in the file, or in the marker set"
+        )
+
+
+def _pelvis_forward(points: Mapping[str, Array]) -> Array:
+    """Return horizontal vectors from the back of the pelvis to its front, (F, 3)."""
+    front = (points["asis_r"] + points["asis_l"]) / 2
+    back = points.get("sacrum")
+    if back is None:
+        back = (points["psis_r"] + points["psis_l"]) / 2
+    return (front - back) * [1, 0, 1]
+
+
+def check_plates(clip: MarkerClip, assigned: Assigned, record: ForceRecord) -> None:
+    """Refuse plates that are loaded far from the person: the unit of their centres is wrong.
+
+    Raises
+    ------
+    MotionStyleError
+        If the loaded plates' centres of pressure lie more than 1.5 m beside the pelvis on the
+        median over the clip.
+    """
+    found = assigned.landmarks
+    pelvis = (clip.path(found["asis_r"]) + clip.path(found["asis_l"])) / 2
+    frames = np.round((record.times - clip.start_s) * clip.rate_hz).astype(int)
+    during = (frames >= 0) & (frames < clip.frames)
+    away = (record.centre[:, during] - pelvis[frames[during]])[..., [0, 2]]
+    away = np.linalg.norm(away, axis=-1)
+    away = away[np.isfinite(away)]
+    if not len(away) or np.median(away) <= NEAR_PLATE_M:
+        return
+    raise MotionStyleError(
+        f"{record.source}: the centre of pressure lies {np.median(away):.3g} m beside the pelvis "
+        f"on the median while a plate is loaded, expected at most {NEAR_PLATE_M} m: check `unit` "
+        "(m or mm) of this file's plates under `forces` of the marker set, and that plates and "
+        "markers share one laboratory frame"
+    )
+
+
 def check_sides(clip: MarkerClip, assigned: Assigned) -> None:
     """Refuse a clip in which right markers lie to the left of their left partners.
 
@@ -80,12 +148,7 @@ def check_sides(clip: MarkerClip, assigned: Assigned) -> None:
         Naming every swapped pair.
     """
     points = {name: clip.path(label) for name, label in assigned.landmarks.items()}
-    front = (points["asis_r"] + points["asis_l"]) / 2
-    back = points.get("sacrum")
-    if back is None:
-        back = (points["psis_r"] + points["psis_l"]) / 2
-    forward = (front - back) * [1, 0, 1]
-    right = np.cross(forward, [0.0, 1.0, 0.0])
+    right = np.cross(_pelvis_forward(points), [0.0, 1.0, 0.0])
     right /= np.linalg.norm(right, axis=1, keepdims=True)
     swapped = []
     for landmark in LANDMARKS:
@@ -106,8 +169,9 @@ def check_sides(clip: MarkerClip, assigned: Assigned) -> None:
 
 def check_clip_of_person(clip: MarkerClip, assigned: Assigned) -> None:
     """Run all checks of a clip in metres with y up."""
-    check_size(clip, assigned)
     check_upright(clip, assigned)
+    check_front(clip, assigned)
+    check_size(clip, assigned)
     check_sides(clip, assigned)
 
 
