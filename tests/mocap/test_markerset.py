@@ -78,6 +78,8 @@ def test_an_unknown_set_has_near_matches():
         ({"tracking": {"tigh_r": ["A"]}}, ["unknown node 'tigh_r'", "did you mean thigh_r"]),
         ({"tracking": {"thigh_r": ["M_c7"]}}, ["label 'M_c7' stands there 2 times"]),
         ({"up_axis": "x"}, ["up_axis is 'x'"]),
+        ({"landmarks": ["heel_r"]}, ["landmarks must be a mapping"]),
+        ({"forces": {"files": "*"}}, ["forces must be a list"]),
         ({"forces": [{"plates": {"1": "rigt"}}]}, ["foot 'rigt'", "did you mean right"]),
         ({"forces": [{"plates": {"1": "left"}, "unit": "ft"}]}, ["unit 'ft'"]),
     ],

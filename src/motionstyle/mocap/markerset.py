@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from motionstyle.body.layout import NODES
 from motionstyle.errors import MotionStyleError, near_matches
+from motionstyle.mocap.map_file import read_map_file
 from motionstyle.mocap.marker_clip import MarkerClip
 from motionstyle.mocap.mot import POSITION_UNITS, PlateColumns
 
@@ -55,14 +55,9 @@ NEEDED_TO_MEASURE = tuple(
     (f"{name}_{side}",) for name in ("knee_lateral", "ankle_lateral") for side in "rl"
 )
 _KEYS = {
-    "note",
-    "landmarks",
-    "tracking",
-    "ignored",
-    "static_only",
-    "forces",
-    "treadmill",
-    "up_axis",
+    **dict.fromkeys(("landmarks", "tracking"), dict),
+    "forces": list,
+    **dict.fromkeys(("note", "ignored", "static_only", "treadmill", "up_axis")),
 }
 FEET = ("right", "left", "nearest")
 
@@ -180,24 +175,7 @@ def read_marker_set(folder: str | Path, name: str) -> MarkerSet:
         If there is no such set, or with every unknown key, landmark, node or foot in it, and
         every label that is used twice.
     """
-    path = Path(folder) / f"{name}.yaml"
-    known = sorted(p.stem for p in Path(folder).glob("*.yaml"))
-    if not path.is_file():
-        raise MotionStyleError(
-            f"marker set '{name}' has no file {path}{near_matches(name, known)}; "
-            f"known marker sets: {', '.join(known)}"
-        )
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        where = getattr(error, "problem_mark", None)
-        line = f" (line {where.line + 1})" if where is not None else ""
-        raise MotionStyleError(f"{path}: not a YAML file{line}") from error
-    if not isinstance(data, dict):
-        raise MotionStyleError(f"{path}: expected the sections {', '.join(sorted(_KEYS))}")
-    problems = [
-        f"unknown key '{k}'{near_matches(str(k), sorted(_KEYS))}" for k in set(data) - _KEYS
-    ]
+    path, data, problems = read_map_file(folder, name, "marker set", _KEYS)
     landmarks = {str(k): _texts(v) for k, v in (data.get("landmarks") or {}).items()}
     tracking = {str(k): _texts(v) for k, v in (data.get("tracking") or {}).items()}
     for section, found, names in (

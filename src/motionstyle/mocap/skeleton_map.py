@@ -13,14 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import yaml
 
 from motionstyle.body.layout import NODES
 from motionstyle.errors import MotionStyleError, near_matches
 from motionstyle.mocap.clip import SkeletonClip, forward_kinematics
+from motionstyle.mocap.map_file import read_map_file
 
 END_NAMES = (
     "head_top",
@@ -32,7 +31,7 @@ REQUIRED_NODES = (
     *(f"{node}_{side}" for node in _LIMB_NODES for side in "rl"),
 )
 _SECTIONS = ("joints", "frames", "ends", "axes", "offsets_like")
-_KEYS = {*_SECTIONS, "ignored", "zero_pose", "note"}
+_KEYS = dict.fromkeys(_SECTIONS, dict) | {"ignored": list, "zero_pose": None, "note": None}
 _DIRECTIONS = {
     sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[i]
     for sign in "+-"
@@ -83,34 +82,6 @@ def _axes(node: str, text: object, problems: list[str]) -> np.ndarray:
     return matrix
 
 
-def _load(path: Path) -> dict[str, Any]:
-    """Return the map's sections: mappings, but for `ignored` (a list) and texts.
-
-    Raises
-    ------
-    MotionStyleError
-        If the file is not YAML, or a section is not of its kind.
-    """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        where = getattr(error, "problem_mark", None)
-        line = f" (line {where.line + 1})" if where is not None else ""
-        raise MotionStyleError(f"{path}: not a YAML file{line}") from error
-    if not isinstance(data, dict):
-        raise MotionStyleError(f"{path}: expected the sections {', '.join(sorted(_KEYS))}")
-    data = {str(key): value for key, value in data.items() if value is not None}
-    kinds = dict.fromkeys(_SECTIONS, dict) | {"ignored": list}
-    wrong = [
-        f"{key} must be a {'list' if kind is list else 'mapping of names'}"
-        for key, kind in kinds.items()
-        if not isinstance(data.get(key, kind()), kind)
-    ]
-    if wrong:
-        raise MotionStyleError(f"{path}: " + "; ".join(wrong))
-    return data
-
-
 def read_skeleton_map(folder: str | Path, name: str) -> SkeletonMap:
     """Read and check one skeleton map.
 
@@ -119,15 +90,7 @@ def read_skeleton_map(folder: str | Path, name: str) -> SkeletonMap:
     MotionStyleError
         If there is no such map, or a key, node or end name in it is unknown.
     """
-    path = Path(folder) / f"{name}.yaml"
-    known = sorted(p.stem for p in Path(folder).glob("*.yaml"))
-    if not path.is_file():
-        raise MotionStyleError(
-            f"skeleton '{name}' has no file {path}{near_matches(name, known)}; "
-            f"known skeletons: {', '.join(known)}"
-        )
-    data = _load(path)
-    problems = [f"unknown key '{k}'{near_matches(k, sorted(_KEYS))}" for k in set(data) - _KEYS]
+    path, data, problems = read_map_file(folder, name, "skeleton", _KEYS)
     joints, frames, ends, axes, offsets_like = (data.get(key, {}) for key in _SECTIONS)
     for section, nodes in (("joints", joints), ("frames", frames), ("axes", axes)):
         for node in nodes:
