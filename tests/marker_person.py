@@ -11,8 +11,8 @@ import yaml
 from motionstyle.body.body import Body
 from motionstyle.body.kinematics import forward_kinematics, points_in_world
 from motionstyle.body.layout import CONTACT_POINTS, NODE_INDEX
-from motionstyle.mocap.marker_clip import MarkerClip
-from motionstyle.mocap.markerset import LANDMARKS
+from motionstyle.mocap.formats.marker_clip import MarkerClip
+from motionstyle.mocap.markers.markerset import LANDMARKS
 
 RATIO = 10  # samples of a plate per frame of a C3D file
 # Columns of two force plates.

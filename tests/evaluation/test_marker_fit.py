@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from motionstyle.evaluation.marker_fit import measured_places, pooled_distances, virtual_place
-from motionstyle.mocap.markerset import read_marker_set
+from motionstyle.mocap.markers.markerset import read_marker_set
 
 SETS = Path(__file__).parents[2] / "config" / "markersets"
 

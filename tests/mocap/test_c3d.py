@@ -9,7 +9,7 @@ import pytest
 
 from marker_person import RATIO, write_c3d
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.c3d import body_mass, read_c3d, read_c3d_forces
+from motionstyle.mocap.formats.c3d import body_mass, read_c3d, read_c3d_forces
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 needs_mirror = pytest.mark.skipif(not MIRROR.is_dir(), reason="no mirror folder")

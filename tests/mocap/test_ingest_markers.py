@@ -15,14 +15,14 @@ from marker_person import forces_file, places, synthetic_markers, write_set, wri
 from motionstyle.body.body import BodyGeometry, build_body
 from motionstyle.body.layout import COORDINATE_INDEX, COORDINATES, NODE_INDEX
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.doors import read_datasets
-from motionstyle.mocap.ingest_markers import ingest_markers, placed_forces
-from motionstyle.mocap.marker_clip import ForceRecord
-from motionstyle.mocap.marker_joints import common_centre
-from motionstyle.mocap.marker_paths import Placement, fill_gaps
-from motionstyle.mocap.markerset import Plates, read_marker_set
-from motionstyle.mocap.plate_feet import forces_by_foot, middle_of_feet
-from motionstyle.mocap.sheet import ClipRow, read_sheet
+from motionstyle.mocap.datasets.doors import read_datasets
+from motionstyle.mocap.datasets.sheet import ClipRow, read_sheet
+from motionstyle.mocap.formats.marker_clip import ForceRecord
+from motionstyle.mocap.markers.ingest import ingest_markers, placed_forces
+from motionstyle.mocap.markers.joints import common_centre
+from motionstyle.mocap.markers.markerset import Plates, read_marker_set
+from motionstyle.mocap.markers.paths import Placement, fill_gaps
+from motionstyle.mocap.markers.plate_feet import forces_by_foot, middle_of_feet
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 CONFIG = Path(__file__).parents[2] / "config"

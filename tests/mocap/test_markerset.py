@@ -10,11 +10,11 @@ import pytest
 
 from marker_person import SET, synthetic_markers, write_set
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.c3d import read_c3d
-from motionstyle.mocap.marker_checks import check_clip_of_person, check_sides, check_size
-from motionstyle.mocap.marker_clip import scaled, upright
-from motionstyle.mocap.markerset import LANDMARKS, assign_labels, read_marker_set
-from motionstyle.mocap.trc import read_trc
+from motionstyle.mocap.formats.c3d import read_c3d
+from motionstyle.mocap.formats.marker_clip import scaled, upright
+from motionstyle.mocap.formats.trc import read_trc
+from motionstyle.mocap.markers.checks import check_clip_of_person, check_sides, check_size
+from motionstyle.mocap.markers.markerset import LANDMARKS, assign_labels, read_marker_set
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 SETS = Path(__file__).parents[2] / "config" / "markersets"

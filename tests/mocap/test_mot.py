@@ -10,7 +10,7 @@ import pytest
 
 from marker_person import NAMES, forces_file
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.mot import PlateColumns, forces_from_mot, read_mot
+from motionstyle.mocap.formats.mot import PlateColumns, forces_from_mot, read_mot
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 PLATES = {

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from motionstyle.body.kinematics import contact_points
 from motionstyle.body.layout import COORDINATE_INDEX, NODE_INDEX
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.mot import PlateColumns, forces_from_mot, read_mot
+from motionstyle.mocap.formats.mot import PlateColumns, forces_from_mot, read_mot
 from motionstyle.motion.mirror import mirror_motion
 from motionstyle.motion.opensim_export import (
     ground_reactions,

@@ -18,7 +18,7 @@ from motionstyle.body.layout import CONTACT_POINTS, NODES
 from motionstyle.dynamics.codegen import load_functions
 from motionstyle.dynamics.functions import dynamics_functions
 from motionstyle.evaluation.joint_loads import joint_loads
-from motionstyle.mocap.mot import read_mot
+from motionstyle.mocap.formats.mot import read_mot
 from motionstyle.motion.opensim_export import (
     ground_reactions,
     opensim_angles,

@@ -7,7 +7,7 @@ import html
 import pytest
 from walkers import ANKLE, STRIDE_M, STRIDE_S, TARGETS
 
-from motionstyle.mocap.bvh import read_bvh
+from motionstyle.mocap.formats.bvh import read_bvh
 from motionstyle.tables import read_table
 
 pytestmark = pytest.mark.workflow

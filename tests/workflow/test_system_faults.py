@@ -16,7 +16,7 @@ from walkers import Project, bvh_text, stop_group
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.jobs import check_writable, forget_killed_runs, job
-from motionstyle.mocap.doors import DATASET_COLUMNS, cached_file
+from motionstyle.mocap.datasets.doors import DATASET_COLUMNS, cached_file
 from motionstyle.motion.storage import load_motion
 
 pytestmark = pytest.mark.workflow
@@ -199,7 +199,7 @@ def test_fault_18_an_edited_library_file_reruns_what_it_touches(twin, editing):
     assert {"figure_body", "figure_gait", "figure_strips", "figure_markers"} <= set(planned)
     assert not {"clips_table", "gait_tables", "motions_table"} & set(planned)
     assert not [name for name in planned if name.startswith(("retarget", "mirror"))]
-    editing("mocap/contacts.py")
+    editing("mocap/fitting/contacts.py")
     planned = twin.run("-n").jobs
     wanted = {f"retarget:{id}" for id in ("steady", "short", "own_01", "mimic")}
     assert wanted <= set(planned)
@@ -354,7 +354,7 @@ def test_fault_24_too_little_memory_for_the_clip_stops_cleanly(project):
         "import resource, sys\n"
         "class Limit:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'motionstyle.mocap.ingest':\n"
+        "        if name == 'motionstyle.mocap.skeletons.ingest':\n"
         "            import numpy, scipy.spatial.transform, scipy.signal, scipy.optimize\n"
         "            square = numpy.eye(200) @ numpy.eye(200)\n"  # BLAS takes its buffers now
         "            numpy.linalg.solve(square, square), scipy.linalg.svd(square)\n"

@@ -11,10 +11,10 @@ import motionstyle
 from motionstyle.configuration import load_config
 from motionstyle.errors import MotionStyleError
 from motionstyle.jobs import check_writable, forget_killed_runs
-from motionstyle.mocap.doors import read_datasets
-from motionstyle.mocap.planted import read_planted
-from motionstyle.mocap.sheet import EMBEDDED, MARKER_FILES, read_sheet
-from motionstyle.mocap.wheel import read_wheel_pin
+from motionstyle.mocap.datasets.doors import read_datasets
+from motionstyle.mocap.planted.variants import read_planted
+from motionstyle.mocap.datasets.sheet import EMBEDDED, MARKER_FILES, read_sheet
+from motionstyle.mocap.datasets.wheel import read_wheel_pin
 
 ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent

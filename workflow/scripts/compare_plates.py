@@ -4,7 +4,7 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.force_plates import FootForce, force_curves, force_plate_rows
 from motionstyle.files import read_json, write_json
 from motionstyle.jobs import job
-from motionstyle.mocap.plate_feet import plates_by_foot
+from motionstyle.mocap.markers.plate_feet import plates_by_foot
 from motionstyle.motion.storage import load_motion, sidecar_path
 
 with job(snakemake.log[0]):

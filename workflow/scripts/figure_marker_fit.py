@@ -7,7 +7,7 @@ from motionstyle.figures.bodies import marker_fit_figure
 from motionstyle.figures.style import save
 from motionstyle.files import read_json
 from motionstyle.jobs import job
-from motionstyle.mocap.markerset import read_marker_set
+from motionstyle.mocap.markers.markerset import read_marker_set
 
 with job(snakemake.log[0]):
     sets = {str(m): read_marker_set(Path(m).parent, Path(m).stem) for m in snakemake.input.maps}

@@ -19,7 +19,7 @@ from motionstyle.evaluation.joint_moments import (
 from motionstyle.evaluation.normative import read_normative
 from motionstyle.files import write_json
 from motionstyle.jobs import job
-from motionstyle.mocap.plate_feet import plates_by_foot
+from motionstyle.mocap.markers.plate_feet import plates_by_foot
 from motionstyle.motion.storage import load_available
 from motionstyle.tables import write_table
 

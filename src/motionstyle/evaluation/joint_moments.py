@@ -19,7 +19,7 @@ from motionstyle.evaluation.force_plates import GRAVITY, LOADED_N, PLATE_CUTOFF_
 from motionstyle.evaluation.gait import Cycle, gait_cycles, normalised_cycles
 from motionstyle.evaluation.joint_loads import JointLoads, Wrench, joint_loads
 from motionstyle.evaluation.normative import Normative, is_level_walk
-from motionstyle.mocap.marker_clip import ForceRecord
+from motionstyle.mocap.formats.marker_clip import ForceRecord
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import lowpass
 
@@ -78,7 +78,7 @@ def measured_foot(
 
 
 def measured_feet(motion: Motion, record: ForceRecord) -> dict[str, MeasuredFoot]:
-    """Return the plates' record by foot (`mocap.plate_feet`) on a motion's frames, by side."""
+    """Return the plates' record by foot (`markers.plate_feet`) on a motion's frames, by side."""
     each = zip(record.names, record.force, record.centre, record.moment, strict=True)
     return {
         name[0]: measured_foot(record.times, force, centre, moment, motion.times)

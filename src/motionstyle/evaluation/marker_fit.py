@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from motionstyle.mocap.markerset import MarkerSet
+from motionstyle.mocap.markers.markerset import MarkerSet
 
 _PLACES = {"centre": "centre", "x": "ahead", "y": "above", "z": "beside"}
 
