@@ -9,8 +9,8 @@ from test_body_fit import SKELETONS, known_gait
 
 from motionstyle.body.kinematics import contact_points, forward_kinematics
 from motionstyle.body.layout import CONTACT_POINTS
-from motionstyle.mocap.contacts import detect_contacts, ground_height
-from motionstyle.mocap.floor import StanceThresholds, runs
+from motionstyle.mocap.fitting.contacts import detect_contacts, ground_height
+from motionstyle.mocap.fitting.floor import StanceThresholds, runs
 from motionstyle.mocap.settings import RetargetSettings, by_action
 
 CONFIG = yaml.safe_load((SKELETONS.parent / "config.yaml").read_text())

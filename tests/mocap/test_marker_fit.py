@@ -3,7 +3,7 @@
 import numpy as np
 
 from motionstyle.body.layout import COORDINATE_INDEX, COORDINATES
-from motionstyle.mocap.marker_fit import BENT_ELBOW, reseeded
+from motionstyle.mocap.markers.fit import BENT_ELBOW, reseeded
 
 SEEN = np.ones(len(COORDINATES), dtype=bool)
 

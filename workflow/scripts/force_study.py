@@ -7,9 +7,7 @@ from motionstyle.dynamics.functions import dynamics_functions
 from motionstyle.evaluation.force_plates import FootForce
 from motionstyle.evaluation.force_study import STUDY_COLUMNS, study_row, variants
 from motionstyle.jobs import job
-from motionstyle.mocap.ingest_markers import placed_forces
-from motionstyle.mocap.markerset import read_marker_set
-from motionstyle.mocap.plate_feet import forces_by_foot
+from motionstyle.mocap.markers.plate_feet import plates_by_foot
 from motionstyle.mocap.settings import of_action
 from motionstyle.motion.markers import load_markers
 from motionstyle.motion.storage import load_motion
@@ -39,10 +37,7 @@ with job(snakemake.log[0]):
             changed = " ".join(f"{key}={value}" for key, value in changes.items())
             row = {"variant": name, "changed": changed, "id": id, **found.report}
             if found.motion is not None:
-                set_file = Path(given.maps[k])
-                marker_set = read_marker_set(set_file.parent, set_file.stem)
-                record = placed_forces(found.motion, given.forces[k], marker_set)
-                feet = forces_by_foot(found.motion, record, marker_set.plates(given.forces[k]))
+                feet = plates_by_foot(found.motion, given.forces[k], given.maps[k])
                 plates = {
                     side[0]: FootForce(feet.times, force)
                     for side, force in zip(feet.names, feet.force, strict=True)

@@ -5,10 +5,10 @@ from pathlib import Path
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import write_json
 from motionstyle.jobs import job
-from motionstyle.mocap.ingest import ingest_clip, provenance
-from motionstyle.mocap.ingest_markers import ingest_markers
+from motionstyle.mocap.datasets.sheet import MARKER_FILES, ClipRow
+from motionstyle.mocap.markers.ingest import ingest_markers
 from motionstyle.mocap.settings import RetargetSettings
-from motionstyle.mocap.sheet import MARKER_FILES, ClipRow
+from motionstyle.mocap.skeletons.ingest import ingest_clip, provenance
 from motionstyle.motion.markers import save_markers
 from motionstyle.motion.storage import save_failure, save_motion
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.mocap.floor import runs
+from motionstyle.mocap.fitting.floor import runs
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import lowpass
 

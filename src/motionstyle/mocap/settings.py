@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
-from motionstyle.mocap.floor import StanceThresholds
+from motionstyle.mocap.fitting.floor import StanceThresholds
 
 T = TypeVar("T")
 
