@@ -19,6 +19,14 @@ def by_action(values: Mapping[str, T], action: str) -> T:
     return values.get(action, values.get(action.split("-", maxsplit=1)[0], values["default"]))
 
 
+def of_action(section: Mapping[str, Any], action: str) -> dict[str, Any]:
+    """Return a section of the configuration with each value by action resolved for one."""
+    return {
+        name: by_action(value, action) if isinstance(value, Mapping) else value
+        for name, value in section.items()
+    }
+
+
 @dataclass(frozen=True)
 class RetargetSettings:
     """How clips become motions.

@@ -6,23 +6,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.body.layout import CONTACT_POINTS
-from motionstyle.mocap.fitting.floor import StanceThresholds, hysteresis, speed
+from motionstyle.mocap.fitting.floor import StanceThresholds, hysteresis, runs, speed
 
 Array = NDArray[np.float64]
 
 
-def ground_height(points: Array, rate_hz: float, *, level: bool) -> Array:
+def ground_height(
+    points: Array, rate_hz: float, thresholds: StanceThresholds, *, level: bool
+) -> Array:
     """Return the height (m) of the ground under each foot point, (F, P).
 
-    On a level floor it is 0. On stairs and blocks it is the lowest level of the point within
-    half a second on either side.
+    On a level floor it is 0. On stairs and blocks it is the level at which the point last rested
+    or will rest next, whichever is nearer in time, and never above the point itself. A foot going
+    down stairs rests on its step until it leaves it, however low it treads next.
     """
     if level:
         return np.zeros(points.shape[:2])
-    window = max(1, round(0.5 * rate_hz))
-    padded = np.pad(points[..., 1], ((window, window), (0, 0)), mode="edge")
-    views = np.lib.stride_tricks.sliding_window_view(padded, 2 * window + 1, axis=0)
-    return views.min(axis=-1)
+    ground = np.array(points[..., 1])
+    speeds = speed(points, rate_hz)
+    frames, shortest = np.arange(len(points)), max(2, round(thresholds.shortest_s * rate_hz))
+    for p in range(points.shape[1]):
+        resting = speeds[:, p] < thresholds.enter_speed_mps
+        rests = [(a, b) for a, b in runs(resting) if b - a + 1 >= shortest]
+        if not rests:
+            ground[:, p] = points[:, p, 1].min()
+            continue
+        levels = np.array([points[a : b + 1, p, 1].min() for a, b in rests])
+        away = np.array([np.maximum(np.maximum(a - frames, frames - b), 0) for a, b in rests])
+        ground[:, p] = np.minimum(levels[away.argmin(axis=0)], points[:, p, 1])
+    return ground
 
 
 def detect_contacts(

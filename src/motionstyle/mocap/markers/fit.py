@@ -91,7 +91,7 @@ def fit_markers(
     q = fit_coordinates(body, markers, start, observed, iterations=60)
     spine = observed[COORDINATE_INDEX["thorax_flexion"]]
     for iterations in (40, 30):
-        q = fit_coordinates(body, markers, _reseeded(q, observed), observed, iterations=iterations)
+        q = fit_coordinates(body, markers, reseeded(q, observed), observed, iterations=iterations)
         markers = with_own_offsets(body, markers, q, seen)
         held = markers.joined(_spine_markers(body, q)) if spine else markers
         q = fit_coordinates(body, held, q, observed, iterations=iterations)
@@ -120,30 +120,48 @@ def start_coordinates(
     return make_continuous(start)[0]
 
 
-def _reseeded(coordinates: Array, observed: NDArray[np.bool_]) -> Array:
-    """Return coordinates in which arms of impossible frames follow the nearest possible ones."""
+def reseeded(coordinates: Array, observed: NDArray[np.bool_]) -> Array:
+    """Return coordinates in which limbs of impossible frames follow the nearest possible ones.
+
+    An arm is impossible where its elbow bends the wrong way or its shoulder turns by half a turn;
+    a foot where it turns on the ankle beyond what ankles do, as few markers on it let it.
+    """
     result, bounds = np.array(coordinates), joint_ranges()
-    frames = np.arange(len(result))
+
+    def within(column: int) -> NDArray[np.bool_]:
+        low, high = bounds[column]
+        angle = result[:, column]
+        return (angle > low - IMPOSSIBLE) & (angle < high + IMPOSSIBLE)
+
     for side in "rl":
         elbow = COORDINATE_INDEX[f"elbow_flexion_{side}"]
-        if not observed[elbow]:
-            continue
-        arm = [i for i, n in enumerate(COORDINATES) if n.endswith(f"_{side}") and "shoulder" in n]
-        arm.append(elbow)
-        turns = np.linalg.norm(result[:, arm[:3]], axis=1)
-        low, high = bounds[elbow]
-        angle = result[:, elbow]
-        good = (angle > low - IMPOSSIBLE) & (angle < high + IMPOSSIBLE) & (turns < np.pi)
-        if good.all():
-            continue
-        if not good.any():
-            result[:, arm] = 0.0
-            result[:, elbow] = BENT_ELBOW
-            continue
-        known = frames[good]
-        nearest = known[np.abs(frames[~good][:, None] - known).argmin(axis=1)]
-        result[np.ix_(~good, arm)] = result[np.ix_(nearest, arm)]
+        if observed[elbow]:
+            arm = [
+                i for i, n in enumerate(COORDINATES) if n.endswith(f"_{side}") and "shoulder" in n
+            ]
+            turns = np.linalg.norm(result[:, arm], axis=1)
+            straight = np.zeros(len(arm) + 1)
+            straight[-1] = BENT_ELBOW
+            _follow(result, [*arm, elbow], within(elbow) & (turns < np.pi), straight)
+        foot = [COORDINATE_INDEX[f"{n}_{side}"] for n in ("ankle_dorsiflexion", "foot_inversion")]
+        if observed[foot].all():
+            _follow(result, foot, within(foot[0]) & within(foot[1]), np.zeros(2))
     return result
+
+
+def _follow(
+    coordinates: Array, columns: list[int], good: NDArray[np.bool_], otherwise: Array
+) -> None:
+    """Set columns of frames that are not good as in the nearest good one, in place."""
+    if good.all():
+        return
+    if not good.any():
+        coordinates[:, columns] = otherwise
+        return
+    known = np.flatnonzero(good)
+    wrong = np.flatnonzero(~good)
+    nearest = known[np.abs(wrong[:, None] - known).argmin(axis=1)]
+    coordinates[np.ix_(wrong, columns)] = coordinates[np.ix_(nearest, columns)]
 
 
 def _spine_markers(body: Body, coordinates: Array) -> VirtualMarkers:

@@ -20,7 +20,7 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.datasets.sheet import ClipRow
 from motionstyle.mocap.fitting.contacts import detect_contacts, ground_height
 from motionstyle.mocap.fitting.retarget import fit_legs_to_ground, make_continuous
-from motionstyle.mocap.fitting.virtual_markers import marker_distances
+from motionstyle.mocap.fitting.virtual_markers import VirtualMarkers, marker_distances
 from motionstyle.mocap.formats.c3d import read_c3d, read_c3d_forces
 from motionstyle.mocap.formats.marker_clip import (
     ForceRecord,
@@ -44,6 +44,7 @@ from motionstyle.mocap.markers.markerset import Assigned, MarkerSet, assign_labe
 from motionstyle.mocap.markers.paths import Placement, belt_velocity
 from motionstyle.mocap.settings import RetargetSettings, by_action
 from motionstyle.mocap.skeletons.ingest import Ingested, frame_window, provenance
+from motionstyle.motion.markers import MarkerPaths
 from motionstyle.motion.motion import Motion
 
 Array = NDArray[np.float64]
@@ -158,7 +159,7 @@ def ingest_markers(
     coordinates, virtual = fit_markers(body, virtual, seen, start, observed)
     level = row.surface == "level"
     points = contact_points(body, forward_kinematics(body, coordinates))
-    ground = ground_height(points, clip.rate_hz, level=level)
+    ground = ground_height(points, clip.rate_hz, thresholds, level=level)
     if record is not None and not level:
         ground = _plate_height(points, record, ground)
     contacts = detect_contacts(points, clip.rate_hz, thresholds, ground)
@@ -197,7 +198,21 @@ def ingest_markers(
         "warnings": _remarks(clip, virtual.names, seen),
     }
     rms = 100 * np.sqrt(np.nanmean(distances**2, axis=0))
-    return Ingested(motion, report, {n: float(r) for n, r in zip(virtual.names, rms, strict=True)})
+    by_name = {n: float(r) for n, r in zip(virtual.names, rms, strict=True)}
+    return Ingested(motion, report, by_name, _measured(virtual, paths, clip.rate_hz))
+
+
+def _measured(virtual: VirtualMarkers, paths: Array, rate_hz: float) -> MarkerPaths:
+    """Return the measured markers on the body, for the physics fit."""
+    return MarkerPaths(
+        names=virtual.names,
+        nodes=virtual.nodes,
+        local=virtual.local,
+        measured=paths,
+        smooth=virtual.world,
+        weights=virtual.weights[..., 0],
+        rate_hz=rate_hz,
+    )
 
 
 def placed_forces(motion: Motion, path: str | Path, markers: MarkerSet) -> ForceRecord:

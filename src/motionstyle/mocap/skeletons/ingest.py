@@ -47,6 +47,7 @@ from motionstyle.mocap.skeletons.skeleton_map import (
     read_skeleton_map,
     restore_offsets,
 )
+from motionstyle.motion.markers import MarkerPaths
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import lowpass
 
@@ -64,12 +65,14 @@ class Ingested:
     """A motion and what was found on the way to it.
 
     report : numbers and texts by column of `tables/clips.csv`; lengths in the unit of their
-    suffix. marker_rms_cm : by marker name, for the figure of the fit.
+    suffix. marker_rms_cm : by marker name, for the figure of the fit. markers : measured ones
+    of a marker clip, for the physics fit.
     """
 
     motion: Motion
     report: dict[str, Any]
     marker_rms_cm: dict[str, float]
+    markers: MarkerPaths | None = None
 
 
 def ingest_clip(
@@ -127,7 +130,7 @@ def ingest_clip(
     start, _ = make_continuous(copied_angles(frames, observed))
     coordinates = fit_coordinates(body, smooth, start, observed)
     points = contact_points(body, forward_kinematics(body, coordinates))
-    ground = ground_height(points, clip.rate_hz, level=level)
+    ground = ground_height(points, clip.rate_hz, thresholds, level=level)
     contacts = detect_contacts(points, clip.rate_hz, thresholds, ground)
     coordinates = fit_legs_to_ground(
         body, smooth, coordinates, contacts, ground, clip.rate_hz, cutoff
