@@ -4,6 +4,7 @@
 rule dynamics_code:
     output:
         library=RESULTS / "dynamics/library.json",
+        second_order=RESULTS / "dynamics/second_order.json",
     log:
         LOGS / "dynamics_code.log",
     benchmark:
@@ -12,7 +13,7 @@ rule dynamics_code:
         "../envs/motionstyle.yaml"
     threads: 1
     resources:
-        mem_mb=2500,
+        mem_mb=3000,
     params:
         library=library("body", "dynamics"),
     script:

@@ -61,7 +61,11 @@ def generate_source(functions: Sequence[ca.Function]) -> str:
 
 
 def compile_library(
-    functions: Sequence[ca.Function], destination: Path, cache: Path, log: Callable[[str], None]
+    functions: Sequence[ca.Function],
+    destination: Path,
+    cache: Path,
+    log: Callable[[str], None],
+    flags: Sequence[str] = FLAGS,
 ) -> None:
     """Write `destination`, a JSON file that says where the compiled functions are, if anywhere.
 
@@ -69,6 +73,7 @@ def compile_library(
     ----------
     functions : to be compiled. cache : folder that keeps libraries by digest.
     log : told whether a library was found, built, or is done without.
+    flags : of the compiler.
 
     Raises
     ------
@@ -85,17 +90,17 @@ def compile_library(
         [compiler, "-march=native", "-Q", "--help=target", "--version"],
         capture_output=True, text=True, check=False,
     ).stdout  # fmt: skip
-    digest = sha256("\0".join([source, version, *FLAGS]).encode()).hexdigest()
+    digest = sha256("\0".join([source, version, *flags]).encode()).hexdigest()
     library = cache / "code" / f"{digest[:32]}.so"
     if library.exists():
         log(f"compiled before: {library.name}")
     else:
-        log(f"compiling {len(source) / 1e6:.1f} MB of C with {compiler} {' '.join(FLAGS)}")
+        log(f"compiling {len(source) / 1e6:.1f} MB of C with {compiler} {' '.join(flags)}")
         with tempfile.TemporaryDirectory() as folder:
             file, built = Path(folder) / "functions.c", Path(folder) / "functions.so"
             file.write_text(source, encoding="utf-8")
             done = subprocess.run(
-                [compiler, *FLAGS, str(file), "-o", str(built), "-lm"],
+                [compiler, *flags, str(file), "-o", str(built), "-lm"],
                 capture_output=True, text=True, check=False,
             )  # fmt: skip
             if done.returncode:
