@@ -44,11 +44,6 @@ class SolverSettings:
     barrier_shrink: float = 0.2
     barrier_power: float = 1.5
     barrier_gate: float = 10.0
-    trust: float = 10.0
-    corrections: int = 4
-    close_enough: float = 0.1
-    calm: float = 1.0
-    wild: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -194,12 +189,12 @@ class InteriorPoint:
         """Return the optimum reached from a point."""
         settings = self.settings
         began = perf_counter()
-        barrier, trust = settings.barrier, settings.trust
+        barrier, last = settings.barrier, 0.0
         least = settings.tolerance / (settings.barrier_gate + 1)
         trace: list[Trace] = []
         values = self.evaluator.values(point.controls, point.coefficients * FORCE_UNIT)
         theta = self._excess(point, values).total()
-        theta_max = 1e4 * max(1.0, theta)
+        limits = (1e4 * max(1.0, theta), 1e-4 * max(1.0, theta))
         filter_: list[tuple[float, float]] = []
         status, error = "iteration limit", np.inf
         step_length = regularisation = 0.0
@@ -241,15 +236,11 @@ class InteriorPoint:
                 phi = self._objective(point, barrier)
             blocks = self._blocks(point, values, slopes, barrier)
             excess = self._excess(point, values)
-            accepted = None
-            for _ in range(12):
-                factor, regularisation = self._factorise(blocks, trust)
-                step, slope = self._newton(point, values, blocks, factor, excess)
-                found = self._corrected(point, values, blocks, factor, excess, step, barrier)
-                accepted = self._accept(found, point, phi, theta, slope, barrier, filter_, theta_max)
-                if accepted:
-                    break
-                trust = max(4 * regularisation, 1e-3)
+            factor = self._factorise(blocks, last)
+            regularisation = factor.delta
+            last = regularisation or last
+            step, slope = self._newton(point, values, blocks, factor, excess)
+            accepted = self._search(point, step, slope, phi, theta, barrier, filter_, limits)
             if accepted is None:
                 if theta <= 1e-9 * max(1.0, abs(phi)):
                     status = "no step found"
@@ -258,7 +249,6 @@ class InteriorPoint:
                 point = self._closed(point, values)
                 filter_, step_length = [], 0.0
                 continue
-            trust = self._next_trust(accepted, regularisation)
             step_length = accepted.length
             point, values = accepted.point, accepted.values
             point = self._safe_duals(point, barrier)
@@ -266,38 +256,18 @@ class InteriorPoint:
             status, point, values, float(error), len(trace) - 1, perf_counter() - began, trace
         )
 
-    def _corrected(
+    def _search(
         self,
         point: Point,
-        values: Values,
-        blocks: _Blocks,
-        factor: _Factor,
-        excess: _Excess,
         step: Point,
+        slope: float,
+        phi: float,
+        theta: float,
         barrier: float,
-    ) -> _Trial:
-        """Return the trial point of a step after second-order corrections.
-
-        The corrections solve again with the same factor for what the step's linearisation left;
-        they follow curved valleys at a tenth of an iteration's cost.
-        """
-        best = self._trial(point, step, barrier)
-        first, theta = best.theta, excess.total()
-        summed = excess
-        for k in range(self.settings.corrections):
-            if not np.isfinite(best.theta) or best.length < 1:
-                break
-            if best.theta <= self.settings.close_enough * max(theta, 1.0):
-                break
-            summed = summed.plus(best.excess)
-            again, _slope = self._newton(point, values, blocks, factor, summed)
-            found = self._trial(point, again, barrier)
-            if not found.theta <= 0.7 * best.theta:
-                break
-            best = replace(found, corrections=k + 1)
-        return replace(best, first_theta=first)
-
-    def _trial(self, point: Point, step: Point, barrier: float) -> _Trial:
+        filter_: list[tuple[float, float]],
+        limits: tuple[float, float],
+    ) -> _Trial | None:
+        """Return the first trial point along the step that the filter accepts, or None."""
         fraction = max(0.99, 1 - barrier)
         primal = self._longest(
             [(point.coefficients, step.coefficients, self.bearing),
@@ -307,41 +277,27 @@ class InteriorPoint:
             [(point.dual, step.dual, self.bearing),
              (point.row_dual, step.row_dual, self.active)], fraction
         )  # fmt: skip
-        moved = point.moved(step, primal, dual)
-        values = self.evaluator.values(moved.controls, moved.coefficients * FORCE_UNIT)
-        excess = self._excess(moved, values)
-        phi = self._objective(moved, barrier)
-        return _Trial(moved, values, excess, excess.total(), phi, primal, 0, np.inf)
-
-    def _accept(
-        self,
-        trial: _Trial,
-        point: Point,
-        phi: float,
-        theta: float,
-        slope: float,
-        barrier: float,
-        filter_: list[tuple[float, float]],
-        theta_max: float,
-    ) -> _Trial | None:
-        if not (np.isfinite(trial.phi) and np.isfinite(trial.theta) and trial.theta <= theta_max):
-            return None
-        if any(trial.theta >= (1 - 1e-5) * t and trial.phi >= p - 1e-5 * t for t, p in filter_):
-            return None
         noise = 10 * np.finfo(float).eps * abs(phi)
-        if trial.theta <= (1 - 1e-5) * theta or trial.phi - noise <= phi - 1e-5 * theta:
-            filter_.append(((1 - 1e-5) * theta, phi - 1e-5 * theta))
-            return trial
+        length = primal
+        for _ in range(25):
+            moved = point.moved(step, length, dual)
+            values = self.evaluator.values(moved.controls, moved.coefficients * FORCE_UNIT)
+            new_theta = self._excess(moved, values).total()
+            new_phi = self._objective(moved, barrier)
+            blocked = not np.isfinite(new_phi + new_theta) or new_theta > limits[0]
+            blocked = blocked or any(
+                new_theta >= (1 - 1e-5) * t and new_phi >= p - 1e-5 * t for t, p in filter_
+            )
+            if not blocked:
+                steep = slope < 0 and length * (-slope) ** 2.3 > theta**1.1
+                if steep and theta <= limits[1]:
+                    if new_phi - phi - noise <= 1e-8 * length * slope:
+                        return _Trial(moved, values, length)
+                elif new_theta <= (1 - 1e-5) * theta or new_phi - noise <= phi - 1e-5 * theta:
+                    filter_.append(((1 - 1e-5) * theta, phi - 1e-5 * theta))
+                    return _Trial(moved, values, length)
+            length *= 0.5
         return None
-
-    def _next_trust(self, trial: _Trial, delta: float) -> float:
-        """Return the least δ of the next step: less where linearisation was good, else more."""
-        relative = trial.theta / max(1.0, np.sqrt(abs(trial.phi)))
-        if relative < self.settings.calm:
-            return 0.0 if delta < 1e-3 else delta * 0.25
-        if relative > self.settings.wild:
-            return max(2 * delta, 1e-3)
-        return delta
 
     def _closed(self, point: Point, values: Values) -> Point:
         slack = np.where(self.active, np.maximum(values.inequalities, 1e-8), 1.0)
@@ -442,14 +398,17 @@ class InteriorPoint:
         ]
         return float(max(parts))
 
-    def _factorise(self, blocks: _Blocks, last: float) -> tuple[_Factor, float]:
-        """Return the factored Newton matrix and the regularisation δ it took."""
-        delta = last
+    def _factorise(self, blocks: _Blocks, last: float) -> _Factor:
+        """Return the factored Newton matrix, regularised by as little δ as makes it convex."""
+        delta = 0.0
         while True:
             found = self._eliminate(blocks, delta)
             if found is not None:
-                return found, delta
-            delta = max(1e-4, 4 * delta)
+                return found
+            if delta == 0:
+                delta = 1e-4 if last == 0 else max(1e-20, last / 3)
+            else:
+                delta *= 100.0 if last == 0 else 8.0
             if not delta < 1e20:
                 raise FloatingPointError("the Newton matrix has entries that are not finite")
 
@@ -591,16 +550,11 @@ class InteriorPoint:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A trial point, its constraint errors (θ their sum), φ, and the step length it took."""
+    """A point that was accepted, and the step length that led to it."""
 
     point: Point
     values: Values
-    excess: _Excess
-    theta: float
-    phi: float
     length: float
-    corrections: int
-    first_theta: float
 
 
 @dataclass(frozen=True)
@@ -638,12 +592,6 @@ class _Excess:
     residuals: Array
     feet: Array
     rows: Array
-
-    def plus(self, other: _Excess) -> _Excess:
-        """Return the sum of two."""
-        return _Excess(
-            self.residuals + other.residuals, self.feet + other.feet, self.rows + other.rows
-        )
 
     def total(self) -> float:
         """Return θ, the sum of all magnitudes."""
