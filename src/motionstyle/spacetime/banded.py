@@ -32,10 +32,6 @@ class BandedHessian:
         factor, info = dpbtrf(band, lower=1, overwrite_ab=1)
         return None if info else factor
 
-    def plus(self, other: BandedHessian, times: float) -> BandedHessian:
-        """Return this + times × other."""
-        return BandedHessian(np.asfortranarray(self.band + times * other.band), self.size)
-
 
 def solve(factor: Array, right: Array) -> Array:
     """Return A⁻¹ b from the Cholesky factor of A, in the shape of b."""

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.spacetime.banded import (
-    BandedHessian,
     assemble_gradient,
     assemble_hessian,
     solve,
@@ -205,8 +204,15 @@ class InteriorPoint:
             theta = self._excess(point, values).total()
             trace.append(
                 Trace(
-                    iteration, perf_counter() - began, energy, phi, theta, error, barrier,
-                    step_length, regularisation,
+                    iteration,
+                    perf_counter() - began,
+                    energy,
+                    phi,
+                    theta,
+                    error,
+                    barrier,
+                    step_length,
+                    regularisation,
                 )  # fmt: skip
             )
             if log:
@@ -343,9 +349,7 @@ class InteriorPoint:
 
     def _excess(self, point: Point, values: Values) -> _Excess:
         rows = np.where(self.active, values.inequalities + point.elastic - point.slack, 0.0)
-        return _Excess(
-            values.residuals - point.lift, values.foot_residuals - point.foot_lift, rows
-        )
+        return _Excess(values.residuals - point.lift, values.foot_residuals - point.foot_lift, rows)
 
     def _gradients(self, slopes: Slopes, lift: Array, foot_lift: Array, rows: Array) -> Array:
         """Return Jᵀy summed over all rows, by u, (F, 105)."""
@@ -365,9 +369,7 @@ class InteriorPoint:
 
     def _error(self, point: Point, values: Values, slopes: Slopes, barrier: float) -> float:
         """Return the scaled optimality error, Wächter & Biegler eq. (5)."""
-        gradient = self._gradients(
-            slopes, point.multiplier, point.foot_multiplier, point.row_dual
-        )
+        gradient = self._gradients(slopes, point.multiplier, point.foot_multiplier, point.row_dual)
         by_controls = assemble_gradient(self.evaluator.basis, gradient)
         by_controls[self.fixed] = 0.0
         by_force = FORCE_UNIT * np.einsum("fru,fr->fu", slopes.by_coefficients, point.multiplier)
@@ -461,9 +463,7 @@ class InteriorPoint:
         bend[:, q, q] += np.swapaxes(slopes.heights, 1, 2) @ up
         bend[:, at, at] += stiff_scaled[:, :n] + stiff_scaled[:, n : 2 * n]
         safe = np.where(self.bearing, point.coefficients, 1.0)
-        pull = np.where(
-            self.bearing, self.force_weight * point.coefficients - barrier / safe, 0.0
-        )
+        pull = np.where(self.bearing, self.force_weight * point.coefficients - barrier / safe, 0.0)
         return _Blocks(
             barrier=barrier,
             curved=bend,

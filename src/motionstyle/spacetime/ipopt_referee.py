@@ -60,7 +60,11 @@ class IpoptReferee:
         tied = ca.vec(v[:N_U, :]) - ca.mtimes(ca.DM(basis), x[N_V * frames :])
         rows = ca.vertcat(ca.reshape(tied, N_U, frames), nonlinear)
         constraint = ca.vec(rows)
-        z, e, forces = v[N_U + N_L : N_U + N_L + N_Z, :], v[N_U + N_L + N_Z :, :], v[N_U : N_U + N_L, :]
+        z, e, forces = (
+            v[N_U + N_L : N_U + N_L + N_Z, :],
+            v[N_U + N_L + N_Z :, :],
+            v[N_U : N_U + N_L, :],
+        )
         ridge = problem.settings.force_weight * FORCE_UNIT**2
         objective = 0.5 * (ca.sumsqr(z) + ca.sumsqr(e) + ridge * ca.sumsqr(forces))
         gradient = ca.gradient(objective, x)
@@ -175,7 +179,9 @@ class IpoptReferee:
         values = ca.vertcat(nz, ca.DM(constant))
         return _sparse(rows, columns, values, self.frames * N_G, self.size)
 
-    def _scatter_hessian(self, nz: ca.MX, pattern: ca.Sparsity, lam_f: ca.MX, ridge: float) -> ca.MX:
+    def _scatter_hessian(
+        self, nz: ca.MX, pattern: ca.Sparsity, lam_f: ca.MX, ridge: float
+    ) -> ca.MX:
         own_rows, own_columns = (np.array(a) for a in pattern.get_triplet())
         frames = np.arange(self.frames)[:, None]
         plain = np.arange(N_U, N_V)
@@ -191,7 +197,8 @@ class IpoptReferee:
         evaluator, frames = self.evaluator, self.frames
         values = evaluator.values(controls, coefficients)
         state = np.concatenate(
-            [values.coordinates, values.rates / UNIT[COUNT], values.accelerations / UNIT[-1]], axis=1
+            [values.coordinates, values.rates / UNIT[COUNT], values.accelerations / UNIT[-1]],
+            axis=1,
         )
         v = np.concatenate(
             [state, coefficients / FORCE_UNIT, values.residuals, values.foot_residuals], axis=1

@@ -199,7 +199,11 @@ class Evaluator:
 
         Eq. (9) without ∂h/∂q: γ(h̄−h) k (h̄−h) along the normal, at the heels.
         """
-        style, feet, gain = self.problem.style, self.problem.feet, self.problem.settings.sigmoid_gain
+        style, feet, gain = (
+            self.problem.style,
+            self.problem.feet,
+            self.problem.settings.sigmoid_gain,
+        )
         height = ((points - feet.ground) * feet.normals).sum(axis=-1)
         squeeze = style.shoe_rest_length - height
         turn = np.tanh(gain * squeeze)
@@ -215,9 +219,7 @@ class Evaluator:
         """Return the first derivatives at a point."""
         total = (values.forces + values.shoe_forces).reshape(self.problem.frames, -1)
         call = self.problem.functions["forces_and_slopes"]
-        found = call(
-            values.coordinates, values.rates, values.accelerations, total, self.parameters
-        )
+        found = call(values.coordinates, values.rates, values.accelerations, total, self.parameters)
         frames = self.problem.frames
         by_state = np.zeros((frames, COUNT, 3 * COUNT))
         for k in range(3):
