@@ -16,10 +16,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.body.layout import CONTACT_POINTS
 from motionstyle.dynamics.inverse import foot_points, inverse_forces
 from motionstyle.dynamics.symbols import BodyParameters
-from motionstyle.spacetime.interior_point import FORCE_UNIT
+from motionstyle.spacetime.solver_point import FORCE_UNIT
 from motionstyle.spacetime.spacetime_problem import COUNT, HEELS, POINTS, Evaluator
 
 Array = NDArray[np.float64]
@@ -91,7 +90,7 @@ class IpoptReferee:
         )  # fmt: skip
 
     def _frame_functions(self) -> tuple[ca.Function, ca.Function, ca.Function, dict]:
-        """Return the nonlinear constraints of one frame, their Jacobian's and Hessian's nonzeros."""
+        """Return one frame's nonlinear constraints, and the nonzeros of their derivatives."""
         problem, evaluator = self.evaluator.problem, self.evaluator
         v = ca.SX.sym("v", N_V)
         d = ca.SX.sym("d", 32 * 3 + 9 * POINTS + 3 * N_E)
@@ -127,12 +126,10 @@ class IpoptReferee:
         ]
         z, e = v[N_U + N_L : N_U + N_L + N_Z], v[N_U + N_L + N_Z :]
         parts = ca.vertcat(residual - z, ca.vertcat(*split) - e, heights)
-        swap = lambda expressions: ca.substitute(expressions, [body.vector], [ca.SX(numbers)])  # noqa: E731
-        parts = swap([parts])[0]
+        parts = ca.substitute(parts, body.vector, ca.SX(numbers))
         lam = ca.SX.sym("lam", N_Z + N_E + POINTS)
         slope = ca.jacobian(parts, v)
         bend = ca.triu(ca.hessian(ca.dot(lam, parts), v)[0])
-        self.labels = len(CONTACT_POINTS)
         return (
             ca.Function("g", [v, d], [parts], {"cse": True}),
             ca.Function("j", [v, d], [ca.vertcat(*slope.nonzeros())], {"cse": True}),

@@ -1,4 +1,4 @@
-"""θ, a style: the 147 parameters of Liu et al. 2005, §3–4, as named values in a file of their own."""
+"""θ, a style: the 147 parameters of Liu et al. 2005, §3–4, by name and in a file of their own."""
 
 from __future__ import annotations
 
