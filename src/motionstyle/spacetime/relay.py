@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from motionstyle.body.body import Body
 from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.footprint_constraints import PrintPose, print_poses
-from motionstyle.spacetime.footprints import Footprint, numbered, print_axes, sole_of
+from motionstyle.spacetime.footprints import Footprint, Sole, numbered, print_axes, sole_of
 
 Array = NDArray[np.float64]
 
@@ -127,17 +127,19 @@ def relay(
     surface: Ramp | Stairs | None = None,
     time_scale: float = 1.0,
     slide: bool = False,
+    other_body: Body | None = None,
 ) -> tuple[Footprint, ...]:
     """Return an example's footprints laid along a way that starts at its first print.
 
     Parameters
     ----------
     footprints : rigid ones of a straight movement on level ground.
-    body : whose soles are laid down.
+    body : of the example.
     rate_hz : of the motion; rows are grouped into stances by it.
     surface : on a straight way, a ramp or stairs; None is level ground.
     time_scale : of all times; 2 is half as fast.
     slide : whether the feet may slide.
+    other_body : whose soles are laid down; the example's by default.
 
     Raises
     ------
@@ -156,7 +158,6 @@ def relay(
     rank = {int(pose): k for k, pose in enumerate(order)}
     rows: list[Footprint] = []
     for index, pose in enumerate(poses):
-        sole = sole_of(body, pose.foot)
         away = _centre(pose, body) - origin
         place, heading = route.at(float(away @ direction))
         if isinstance(surface, Stairs):
@@ -165,32 +166,46 @@ def relay(
         forward_right = place + float(away @ across) * side
         toe_out = (pose.yaw - base_yaw + 180) % 360 - 180
         yaw = base_yaw + math.degrees(heading) + toe_out
-        half = _half_length(body, pose.foot)
+        half = _half_length(other_body or body, pose.foot)
         ahead, height, normal = _lift(surface, forward_right[0], rank[index], half, direction)
         centre = origin + ahead * direction + forward_right[1] * across
         centre[1] = origin[1] + height
-        forward, right = print_axes(yaw, normal)
-        heel = centre - half * forward
-        for one in pose.rows:
-            u, v = sole.of(one.point)
-            x, y, z = (heel + u * forward + v * right).tolist()
-            rows.append(
-                replace(
-                    one,
-                    t_on=one.t_on * time_scale,
-                    t_off=one.t_off * time_scale,
-                    x=x,
-                    y=y,
-                    z=z,
-                    yaw=(yaw + 180) % 360 - 180,
-                    normal_x=float(normal[0]),
-                    normal_y=float(normal[1]),
-                    normal_z=float(normal[2]),
-                    slide=slide or one.slide,
-                )
-            )
+        forward, _right = print_axes(yaw, normal)
+        sole = sole_of(other_body or body, pose.foot)
+        for one in _laid(pose, sole, centre - half * forward, (yaw, normal)):
+            times = {"t_on": one.t_on * time_scale, "t_off": one.t_off * time_scale}
+            rows.append(replace(one, **times, slide=slide or one.slide))
     rows.sort(key=lambda one: (one.t_on, one.foot))
     return numbered(rows)
+
+
+def resoled(
+    footprints: Sequence[Footprint], body: Body, rate_hz: float, other_body: Body, *, slide: bool
+) -> tuple[Footprint, ...]:
+    """Return footprints of one body as another body leaves them: middles of the feet kept."""
+    rows = []
+    for pose in print_poses(footprints, body, rate_hz):
+        forward, _right = print_axes(pose.yaw, pose.normal)
+        heel = _centre(pose, body) - _half_length(other_body, pose.foot) * forward
+        sole = sole_of(other_body, pose.foot)
+        for one in _laid(pose, sole, heel, (pose.yaw, pose.normal)):
+            rows.append(replace(one, slide=slide or one.slide))
+    rows.sort(key=lambda one: (one.t_on, one.foot))
+    return numbered(rows)
+
+
+def _laid(pose: PrintPose, sole: Sole, heel: Array, plane: tuple[float, Array]) -> list[Footprint]:
+    """Return the rows of a print with a sole laid down at `heel` (3,), m."""
+    yaw, normal = plane
+    forward, right = print_axes(yaw, normal)
+    rows = []
+    for one in pose.rows:
+        u, v = sole.of(one.point)
+        x, y, z = (heel + u * forward + v * right).tolist()
+        a, b, c = normal.tolist()
+        tilt = {"normal_x": a, "normal_y": b, "normal_z": c}
+        rows.append(replace(one, x=x, y=y, z=z, yaw=(yaw + 180) % 360 - 180, **tilt))
+    return rows
 
 
 def _half_length(body: Body, foot: str) -> float:
