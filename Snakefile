@@ -11,6 +11,7 @@ configfile: workflow.source_path("config/config.yaml")
 include: "workflow/rules/common.smk"
 include: "workflow/rules/mocap.smk"
 include: "workflow/rules/physics.smk"
+include: "workflow/rules/spacetime.smk"
 include: "workflow/rules/evaluation.smk"
 include: "workflow/rules/report.smk"
 

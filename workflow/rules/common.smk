@@ -15,12 +15,13 @@ from motionstyle.mocap.doors import read_datasets
 from motionstyle.mocap.planted import read_planted
 from motionstyle.mocap.sheet import EMBEDDED, MARKER_FILES, read_sheet
 from motionstyle.mocap.wheel import read_wheel_pin
+from motionstyle.spacetime.synthesis_sheet import read_syntheses
 
 ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
 PATH_KEYS = (
     *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
-    *("planted", "normative"),
+    *("planted", "normative", "syntheses"),
 )
 
 
@@ -56,6 +57,12 @@ try:
         for recipe in read_planted(CONFIG["planted"])
         if recipe.base in CLIPS and CLIPS[recipe.base].dataset == EMBEDDED
     }
+    # Motions are synthesised from clips of the sheet; rows whose clips it has not are left out.
+    SYNTHESES = {
+        row.id: row
+        for row in read_syntheses(CONFIG["syntheses"])
+        if all(id in CLIPS for id in (*row.clips, *row.others))
+    }
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
 
@@ -74,13 +81,17 @@ PLATES = [id for id, row in CLIPS.items() if row.forces and "force_plates" in ro
 PHYSICAL = [
     id
     for id, row in CLIPS.items()
-    if row.level == "physical" or "nio" in row.experiments or id in PLATES
+    if row.level == "physical"
+    or "nio" in row.experiments
+    or id in PLATES
+    or any(id in synthesis.clips for synthesis in SYNTHESES.values())
 ]
 
 
 wildcard_constraints:
     clip="|".join(CLIPS) or "none",
     planted="|".join(PLANTED) or "none",
+    synthesis="|".join(SYNTHESES) or "none",
 
 
 @cache
@@ -136,10 +147,28 @@ def companion(id, kind):
     return [source_file(CLIPS[id], name)] if name else []
 
 
+def synthesis_motions(row):
+    """Return the physical motions a synthesis is made from, by name of the input."""
+    files = {"example": MOTIONS / f"captured/{row.example}_physical.npz"}
+    if row.footprint_clip not in ("", row.example):
+        files["source"] = MOTIONS / f"captured/{row.footprint_clip}_physical.npz"
+    if row.footprints.kind == "file":
+        files["file"] = row.folder / row.footprints.text("path")
+    return files
+
+
+def synthesis_text(id):
+    """Return what a synthesis depends on, as text: a change makes it anew."""
+    row = SYNTHESES[id]
+    return repr([getattr(row, name) for name in vars(row) if name not in ("row", "note")])
+
+
 def motion_files():
     """Return the files of every motion of this run."""
     captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
     captured += [MOTIONS / "captured" / f"{id}_physical.npz" for id in PHYSICAL]
+    captured += [MOTIONS / f"{kind}/{id}.npz" for id in SYNTHESES for kind in ("nio", "warp")]
+    captured += [MOTIONS / f"warp/{id}_copied.npz" for id in SYNTHESES]
     return captured + [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
 
 
@@ -148,6 +177,7 @@ TABLES = [
     RESULTS / f"tables/{name}.csv"
     for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
 ]
+TABLES += [RESULTS / "tables/syntheses.csv"]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {

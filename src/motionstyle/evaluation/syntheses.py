@@ -6,7 +6,8 @@ degrees, lengths in cm or mm as the names say; nan where a motion does not show 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +24,14 @@ from motionstyle.evaluation.gait import (
 from motionstyle.mocap.floor import runs
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.foot_constraints import FootConstraints
+from motionstyle.spacetime.synthesis_plan import Plan
+from motionstyle.spacetime.synthesis_sheet import SynthesisRow
 
 Array = NDArray[np.float64]
 
 GRAVITY = 9.81
 WIDEST_TURN_M = 15.0  # where the path's radius is larger, the motion does not turn
+LEAST_TURN_DEG = 20.0  # a motion whose path turns less from first to last does not turn at all
 UNLOADED_BW = 0.05  # a foot that bears less than this share of body weight flies
 CONE_TOLERANCE_N = 0.5
 RANGE_TOLERANCE_DEG = 0.1
@@ -43,9 +47,12 @@ def turn_rates(motion: Motion) -> Array:
 
 
 def turning_frames(motion: Motion) -> NDArray[np.bool_]:
-    """Return in which frames the path's radius is below 15 m, (F,)."""
+    """Return in which frames the path's radius is below 15 m, (F,); none of a straight motion."""
+    rates = turn_rates(motion)
+    if abs(rates.sum()) / motion.rate_hz < np.radians(LEAST_TURN_DEG):
+        return np.zeros(motion.frames, dtype=bool)
     speed = np.linalg.norm(np.gradient(smooth_path(motion), 1 / motion.rate_hz, axis=0), axis=1)
-    return np.abs(turn_rates(motion)) * WIDEST_TURN_M > np.maximum(speed, 0.1)
+    return np.abs(rates) * WIDEST_TURN_M > np.maximum(speed, 0.1)
 
 
 def _trunk(motion: Motion) -> Array:
@@ -281,14 +288,9 @@ def cone_excess_n(motion: Motion, feet: FootConstraints) -> float:
 
     Pulling on the ground and pushing with a point that is not held count in full.
     """
-    if motion.contact_forces is None:
-        return float("nan")
-    forces = motion.contact_forces
-    normal = (forces * feet.normals).sum(axis=-1)
-    along = np.linalg.norm(forces - normal[..., None] * feet.normals, axis=-1)
-    excess = np.maximum(along - feet.friction * np.maximum(normal, 0.0), -normal)
-    free = np.linalg.norm(forces, axis=-1)
-    return float(np.maximum(np.where(feet.held, excess, free), 0.0).max())
+    return (
+        float("nan") if motion.contact_forces is None else feet.cone_excess(motion.contact_forces)
+    )
 
 
 def range_excess_deg(motion: Motion, ranges: Array) -> float:
@@ -370,3 +372,55 @@ def synthesis_measures(
     row["closer_to_own_style"] = closer_to_own(motion, own, same)
     row["closer_to_own_subject"] = closer_to_own(motion, own, foreign)
     return row
+
+
+def synthesis_rows(
+    row: SynthesisRow,
+    plan: Plan | None,
+    motions: Mapping[str, Motion],
+    reports: Mapping[str, Mapping[str, Any]],
+    config: str,
+    *,
+    own: Motion | None,
+    others: Sequence[Motion],
+    captured: Motion | None,
+) -> list[dict[str, object]]:
+    """Return the rows of one synthesis: the motion itself (`nio`), `warp` and `copied`.
+
+    Parameters
+    ----------
+    plan : None where the footprints have failed; the rows then give the reason.
+    motions : by kind, those that could be made. reports : of the solvers, by kind.
+    own, others, captured : see `synthesis_measures`.
+    """
+    about = own.provenance if own is not None else {}
+    rows = []
+    for kind in ("nio", "warp", "copied"):
+        report = reports.get(kind, reports["warp"] if kind == "copied" else {})
+        result: dict[str, object] = {
+            "config": config,
+            "id": row.id,
+            "kind": kind,
+            "task": row.task,
+            "example": row.example,
+            "style": row.style,
+            "mood": row.mood,
+            "action": about.get("action"),
+            "subject": about.get("subject"),
+            "data": "captured",
+        }
+        if plan is not None and kind in motions:
+            result |= synthesis_measures(
+                motions[kind], plan.feet, plan.ranges, own=own, others=others, captured=captured
+            )
+        if kind != "copied":
+            known = {name: report[name] for name in SYNTHESIS_COLUMNS if name in report}
+            result |= known
+        elif kind in motions:
+            result["status"] = "ok"
+        else:
+            result |= {"status": "failed", "reason": report.get("reason")}
+        if "cone_excess_n" in report:
+            result["cone_kept"] = report["cone_excess_n"] <= CONE_TOLERANCE_N
+        rows += [{**result, "experiment": one} for one in row.experiment or ("",)]
+    return rows

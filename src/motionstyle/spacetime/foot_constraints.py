@@ -58,3 +58,14 @@ class FootConstraints:
     def frames(self) -> int:
         """Number of frames."""
         return len(self.held)
+
+    def cone_excess(self, forces: Array) -> float:
+        """Return by how much the worst of forces (F, 8, 3), N, leaves its friction cone.
+
+        Pulling on the ground and pushing with a point that is not held count in full.
+        """
+        normal = (forces * self.normals).sum(axis=-1)
+        along = np.linalg.norm(forces - normal[..., None] * self.normals, axis=-1)
+        excess = np.maximum(along - self.friction * np.maximum(normal, 0.0), -normal)
+        free = np.linalg.norm(forces, axis=-1)
+        return float(np.maximum(np.where(self.held, excess, free), 0.0).max())

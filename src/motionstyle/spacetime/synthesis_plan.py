@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.body.body import Body
 from motionstyle.errors import MotionStyleError
+from motionstyle.files import read_json
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.captured_footprints import footprints_of
 from motionstyle.spacetime.edits import (
@@ -48,7 +50,8 @@ class Plan:
     example : the window of the motion that is copied.
     footprints : checked. feet : the same, frame by frame.
     body : edited. ranges : of the 35 coordinates, (35, 2), rad.
-    start : the example copied along the footprints, with the edited body, inside the ranges.
+    copied : the example copied along the footprints, with the edited body.
+    start : the same inside the ranges, from where solvers start.
     """
 
     example: Motion
@@ -56,6 +59,7 @@ class Plan:
     feet: FootConstraints
     body: Body
     ranges: Array
+    copied: Motion
     start: Motion
 
 
@@ -166,15 +170,30 @@ def make_plan(
         footprints, body, frames, example.rate_hz, like=example if same and unscaled else None
     )
     feet = edit_constraints(feet, edits)
-    start = copied_along(example, footprints, frames, example.rate_hz, id=row.id, body=body)
+    copied = copied_along(
+        example, footprints, frames, example.rate_hz, id=f"{row.id}_copied", body=body
+    )
     provenance = {
-        **start.provenance,
+        **copied.provenance,
         "synthesis": row.id,
         "task": row.task,
         "style": row.style,
         "mood": row.mood,
     }
-    start = replace(
-        start, coordinates=into_ranges(start.coordinates, ranges), provenance=provenance
-    )
-    return Plan(example, tuple(footprints), feet, body, ranges, start)
+    copied = replace(copied, provenance=provenance)
+    start = replace(copied, id=row.id, coordinates=into_ranges(copied.coordinates, ranges))
+    return Plan(example, tuple(footprints), feet, body, ranges, copied, start)
+
+
+def load_plan(row: SynthesisRow, example: Motion, table: str | Path, status: str | Path) -> Plan:
+    """Return the plan of footprints that lie in files: their table, and whether they can be.
+
+    Raises
+    ------
+    MotionStyleError
+        If the footprints have failed their check, with its reason.
+    """
+    known = read_json(status)
+    if known["status"] != "ok":
+        raise MotionStyleError(known["reason"])
+    return make_plan(row, example, read_footprints(table), int(known["frames"]))

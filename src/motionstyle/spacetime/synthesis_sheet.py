@@ -163,6 +163,20 @@ def read_syntheses(
     return tuple(rows)
 
 
+def read_row(path: str | Path, id: str) -> SynthesisRow:
+    """Return one row of the sheet.
+
+    Raises
+    ------
+    MotionStyleError
+        If the sheet has problems or no such row.
+    """
+    rows = {row.id: row for row in read_syntheses(path)}
+    if id not in rows:
+        raise MotionStyleError(f"{path}: no synthesis {id!r}{near_matches(id, list(rows))}")
+    return rows[id]
+
+
 def _row(cells: Cells, folder: Path) -> SynthesisRow:
     style = cells.required("style")
     recipe = style.split(":")[0]

@@ -1,0 +1,152 @@
+# New motions from old: footprints, the warped baseline, and synthesis by least energy.
+
+
+rule footprints:
+    input:
+        unpack(lambda wildcards: synthesis_motions(SYNTHESES[wildcards.synthesis])),
+    output:
+        table=RESULTS / "footprints/{synthesis}.tsv",
+        status=RESULTS / "footprints/{synthesis}.json",
+        svg=RESULTS / "footprints/{synthesis}.svg",
+        png=RESULTS / "footprints/{synthesis}.png",
+    log:
+        LOGS / "footprints/{synthesis}.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "spacetime", "figures"),
+        sheet=CONFIG["syntheses"],
+        row=lambda wildcards: synthesis_text(wildcards.synthesis),
+    script:
+        "../scripts/footprints.py"
+
+
+rule warp:
+    input:
+        unpack(lambda wildcards: synthesis_motions(SYNTHESES[wildcards.synthesis])),
+        table=RESULTS / "footprints/{synthesis}.tsv",
+        status=RESULTS / "footprints/{synthesis}.json",
+    output:
+        warped=MOTIONS / "warp/{synthesis}.npz",
+        warped_sidecar=MOTIONS / "warp/{synthesis}.json",
+        copied=MOTIONS / "warp/{synthesis}_copied.npz",
+        copied_sidecar=MOTIONS / "warp/{synthesis}_copied.json",
+        report=RESULTS / "syntheses/{synthesis}_warp.json",
+    log:
+        LOGS / "warp/{synthesis}.log",
+    benchmark:
+        BENCHMARKS / "warp/{synthesis}.tsv"
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "spacetime"),
+        sheet=CONFIG["syntheses"],
+        row=lambda wildcards: synthesis_text(wildcards.synthesis),
+    script:
+        "../scripts/warp.py"
+
+
+rule initial_style:
+    input:
+        motion=MOTIONS / "captured/{clip}_physical.npz",
+        code=RESULTS / "dynamics/library.json",
+    output:
+        style=RESULTS / "styles/initial/{clip}.json",
+    log:
+        LOGS / "styles/initial/{clip}.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "dynamics", "spacetime"),
+    script:
+        "../scripts/initial_style.py"
+
+
+rule synthesise:
+    input:
+        unpack(lambda wildcards: synthesis_motions(SYNTHESES[wildcards.synthesis])),
+        table=RESULTS / "footprints/{synthesis}.tsv",
+        status=RESULTS / "footprints/{synthesis}.json",
+        style=lambda wildcards: RESULTS
+        / "styles/{0.recipe}/{0.style_clip}.json".format(SYNTHESES[wildcards.synthesis]),
+        code=RESULTS / "dynamics/library.json",
+        second_order=RESULTS / "dynamics/second_order.json",
+    output:
+        motion=MOTIONS / "nio/{synthesis}.npz",
+        sidecar=MOTIONS / "nio/{synthesis}.json",
+        report=RESULTS / "syntheses/{synthesis}_nio.json",
+    log:
+        LOGS / "synthesise/{synthesis}.log",
+    benchmark:
+        BENCHMARKS / "synthesise/{synthesis}.tsv"
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    params:
+        library=library("body", "motion", "dynamics", "spacetime"),
+        sheet=CONFIG["syntheses"],
+        row=lambda wildcards: synthesis_text(wildcards.synthesis),
+    script:
+        "../scripts/synthesise.py"
+
+
+rule measure_synthesis:
+    input:
+        unpack(lambda wildcards: synthesis_motions(SYNTHESES[wildcards.synthesis])),
+        table=RESULTS / "footprints/{synthesis}.tsv",
+        status=RESULTS / "footprints/{synthesis}.json",
+        nio=MOTIONS / "nio/{synthesis}.npz",
+        warp=MOTIONS / "warp/{synthesis}.npz",
+        copied=MOTIONS / "warp/{synthesis}_copied.npz",
+        nio_report=RESULTS / "syntheses/{synthesis}_nio.json",
+        warp_report=RESULTS / "syntheses/{synthesis}_warp.json",
+        own=lambda wildcards: MOTIONS
+        / "captured/{0.style_clip}.npz".format(SYNTHESES[wildcards.synthesis]),
+        others=lambda wildcards: [
+            MOTIONS / f"captured/{id}.npz" for id in SYNTHESES[wildcards.synthesis].others
+        ],
+    output:
+        rows=RESULTS / "syntheses/{synthesis}.json",
+    log:
+        LOGS / "measure_synthesis/{synthesis}.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "spacetime", "evaluation"),
+        sheet=CONFIG["syntheses"],
+        row=lambda wildcards: synthesis_text(wildcards.synthesis),
+        config=CONFIG["name"],
+    script:
+        "../scripts/measure_synthesis.py"
+
+
+rule syntheses_table:
+    input:
+        rows=[RESULTS / f"syntheses/{id}.json" for id in SYNTHESES],
+    output:
+        table=RESULTS / "tables/syntheses.csv",
+    log:
+        LOGS / "syntheses_table.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=500,
+    params:
+        library=library("evaluation"),
+    script:
+        "../scripts/syntheses_table.py"
