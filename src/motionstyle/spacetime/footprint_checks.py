@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from motionstyle.body.body import Body
 from motionstyle.errors import MotionStyleError
-from motionstyle.spacetime.footprint_constraints import PrintPose, frames_of, print_poses
+from motionstyle.spacetime.footprint_constraints import (
+    ONE_PRINT_M,
+    PrintPose,
+    frames_of,
+    heel_of,
+    print_poses,
+)
 from motionstyle.spacetime.footprints import (
     SIDES,
     Footprint,
@@ -103,7 +109,10 @@ def _alone(rows: Sequence[Footprint], frames: int, rate_hz: float) -> list[str]:
 def _overlaps(rows: Sequence[Footprint], body: Body, rate_hz: float) -> list[str]:
     """Return rows that hold one point at once, or points of a foot apart from its shape."""
     problems = []
-    places = [points_of(one, sole_of(body, one.foot)) for one in rows]
+    soles = {foot: sole_of(body, foot) for foot in SIDES}
+    places = [points_of(one, soles[one.foot]) for one in rows]
+    heels = [heel_of(one, soles[one.foot]) for one in rows]
+    told: set[tuple[float, ...]] = set()
     for i, j in itertools.combinations(range(len(rows)), 2):
         a, b = rows[i], rows[j]
         (a_on, a_off), (b_on, b_off) = frames_of(a, rate_hz), frames_of(b, rate_hz)
@@ -111,13 +120,23 @@ def _overlaps(rows: Sequence[Footprint], body: Body, rate_hz: float) -> list[str
         if a.foot != b.foot or stop <= first:
             continue
         when = f"at {first / rate_hz:.3g} s"
+        apart = float(np.linalg.norm(heels[i] - heels[j]))
+        if apart > ONE_PRINT_M:  # two prints: told once, not for each point of the foot
+            key = (*heels[i].round(2), *heels[j].round(2))
+            if key not in told:
+                problems.append(
+                    f"{labels([a, b])}: the {SIDES[a.foot]} foot stands in two places {when}, "
+                    f"{apart:.2f} m apart; left and right must take turns"
+                )
+            told.add(key)
+            continue
         shared = sorted(set(places[i]) & set(places[j]))
         if shared:
             away = max(float(np.linalg.norm(places[i][n] - places[j][n])) for n in shared)
             how = "in two places" if away > SAME_PLACE_M else "twice"
             problems.append(f"{labels([a, b])} hold {', '.join(shared)} {how} {when}")
             continue
-        sole = sole_of(body, a.foot)
+        sole = soles[a.foot]
         for (n, p), (m, q) in itertools.product(places[i].items(), places[j].items()):
             wanted = math.dist(sole.points[n[:-2]], sole.points[m[:-2]])
             found = float(np.linalg.norm(p - q))

@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 
 FRICTION = 0.8  # dry shoe on a floor
 SLIDING_FRICTION = 0.02  # a skate on ice
+ONE_PRINT_M = 0.1  # rows of a foot whose heels lie farther apart are different prints
 EDGE_MARGIN_M = 0.04  # how far before and behind an edge a swinging foot keeps to the upper step
 USUAL_SWING_S = 0.4  # of a swing cut off by the motion's ends
 
@@ -86,19 +87,20 @@ def print_poses(
     return tuple(sorted(poses, key=lambda pose: (pose.first, pose.stop)))
 
 
-def _heel(one: Footprint, sole: Sole) -> Array:
+def heel_of(one: Footprint, sole: Sole) -> Array:
+    """Return where the heel of the flat foot is that a row belongs to, (3,), m."""
     forward, right = print_axes(one.yaw, one.normal)
     ahead, aside = sole.of(one.point)
     return one.place - ahead * forward - aside * right
 
 
 def _apart(a: Footprint, b: Footprint, sole: Sole) -> bool:
-    return bool(np.linalg.norm(_heel(a, sole) - _heel(b, sole)) > 0.1)
+    return bool(np.linalg.norm(heel_of(a, sole) - heel_of(b, sole)) > ONE_PRINT_M)
 
 
 def _pose(stance: list[Footprint], sole: Sole, rate_hz: float) -> PrintPose:
     spans = [frames_of(one, rate_hz) for one in stance]
-    heel = np.mean([_heel(one, sole) for one in stance], axis=0)
+    heel = np.mean([heel_of(one, sole) for one in stance], axis=0)
     one = stance[0]
     first, stop = min(a for a, _ in spans), max(b for _, b in spans)
     return PrintPose(one.foot, first, stop, heel, one.yaw, one.normal, tuple(stance))

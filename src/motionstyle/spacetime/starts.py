@@ -25,7 +25,7 @@ from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import lowpass
 from motionstyle.spacetime.captured_footprints import footprints_of
 from motionstyle.spacetime.foot_constraints import FootConstraints
-from motionstyle.spacetime.footprint_constraints import print_poses, to_constraints
+from motionstyle.spacetime.footprint_constraints import PrintPose, print_poses, to_constraints
 from motionstyle.spacetime.footprints import Footprint, print_axes, sole_of
 
 Array = NDArray[np.float64]
@@ -37,10 +37,14 @@ _FEET = [[k for k, name in enumerate(CONTACT_POINTS) if name.endswith(f"_{s}")] 
 
 @dataclass(frozen=True)
 class RootWay:
-    """Where footprints lead the root: places on the surface (F, 3), m, and headings (F,), rad."""
+    """Where footprints lead the root.
+
+    places : on the surface, (F, 3), m. headings : rad, (F,). climbs : rise per forward metre, (F,).
+    """
 
     places: Array
     headings: Array
+    climbs: Array
 
 
 def root_way(footprints: Sequence[Footprint], body: Body, frames: int, rate_hz: float) -> RootWay:
@@ -57,10 +61,9 @@ def root_way(footprints: Sequence[Footprint], body: Body, frames: int, rate_hz: 
     poses = print_poses(footprints, body, rate_hz)
     if len(poses) < 2:
         raise MotionStyleError(f"{len(poses)} stance gives the root no way; need two")
-    middles, centres = [], []
+    middles, centres = _stance_middles(poses, frames), []
     for pose in poses:
         forward, _right = print_axes(pose.yaw, pose.normal)
-        middles.append((pose.first + pose.stop) / 2)
         centres.append(pose.heel + sole_of(body, pose.foot).points["toe"][0] / 2 * forward)
     order = np.argsort(middles, kind="stable")
     times, places = np.array(middles)[order], np.array(centres)[order]
@@ -85,7 +88,24 @@ def root_way(footprints: Sequence[Footprint], body: Body, frames: int, rate_hz: 
         yaws = np.unwrap([np.radians(poses[k].yaw) for k in order])
         at = np.array(middles)[order] + np.arange(len(order)) * 1e-6
         headings = np.where(still, np.interp(t, at, yaws), headings)
-    return RootWay(way, np.unwrap(headings))
+    climbs = rates[:, 1] / np.maximum(np.hypot(rates[:, 0], rates[:, 2]), 0.1 / rate_hz)
+    return RootWay(way, np.unwrap(headings), climbs)
+
+
+def _stance_middles(poses: Sequence[PrintPose], frames: int) -> list[float]:
+    """Return the middle frames of stances; one cut off by an end is taken as long as usual."""
+    whole = [p.stop - p.first for p in poses if p.first > 0 and p.stop < frames]
+    usual = float(np.median(whole)) if whole else 0.0
+    middles = []
+    for pose in poses:
+        half = max(usual, pose.stop - pose.first) / 2
+        if pose.first <= 0 and pose.stop < frames:
+            middles.append(pose.stop - half)
+        elif pose.stop >= frames and pose.first > 0:
+            middles.append(pose.first + half)
+        else:
+            middles.append((pose.first + pose.stop) / 2)
+    return middles
 
 
 def feet_down(constraints: FootConstraints) -> NDArray[np.int64]:
@@ -114,6 +134,7 @@ def matching_frames(example: NDArray[np.int64], wanted: NDArray[np.int64]) -> Ar
     """
     source, target = _intervals(example), _intervals(wanted)
     frames = np.empty(len(wanted))
+    pace = _pace(source, target)
     last = -1
     for kind, first, stop in target:
         same = [k for k, (other, _a, _b) in enumerate(source) if other == kind]
@@ -129,21 +150,37 @@ def matching_frames(example: NDArray[np.int64], wanted: NDArray[np.int64]) -> Ar
             candidates = same if stop == len(wanted) or last + 1 in same else whole
             chosen = min(candidates, key=lambda k: (k - last - 1) % len(source))
         _kind, a, b = source[chosen]
-        frames[first:stop] = _same_share(first, stop, a, b, len(wanted), len(example))
+        frames[first:stop] = _same_share((first, stop, len(wanted)), (a, b, len(example)), pace)
         last = chosen
     return frames
 
 
-def _same_share(first: int, stop: int, a: int, b: int, wanted: int, example: int) -> Array:
-    """Return frames of the interval a to b − 1 at the same share of time as first to stop − 1.
+def _pace(source: list[tuple[int, int, int]], target: list[tuple[int, int, int]]) -> float:
+    """Return frames of the example per wanted frame, from whole intervals with the same feet."""
+    lengths = [
+        {kind: [b - a for k, a, b in found[1:-1] if k == kind] for kind in range(4)}
+        for found in (source, target)
+    ]
+    ratios = [
+        float(np.mean(lengths[0][kind]) / np.mean(lengths[1][kind]))
+        for kind in range(4)
+        if lengths[0][kind] and lengths[1][kind]
+    ]
+    return float(np.median(ratios)) if ratios else 1.0
 
-    Intervals cut off by both beginnings are set together by their ends.
+
+def _same_share(wanted: tuple[int, int, int], own: tuple[int, int, int], pace: float) -> Array:
+    """Return frames of an interval at the same share of time as those of a wanted one.
+
+    Both are first frame, end and length of all. Intervals cut off by both beginnings are set
+    together by their ends, and those cut off by both ends by their beginnings.
     """
+    (first, stop, frames), (a, b, length) = wanted, own
     index = np.arange(first, stop)
-    if first == 0 and a == 0 and stop < wanted and b < example:
-        return np.maximum(b - (stop - index), a).astype(float)
-    if stop == wanted and b == example and first > 0 and a > 0:
-        return np.minimum(a + (index - first), b - 1).astype(float)
+    if first == 0 and a == 0 and stop < frames and b < length:
+        return np.maximum(b - (stop - index) * pace, a)
+    if stop == frames and b == length and first > 0 and a > 0:
+        return np.minimum(a + (index - first) * pace, b - 1)
     share = (index - first + 0.5) / (stop - first)
     return np.clip(a + share * (b - a) - 0.5, a, b - 1)
 
@@ -175,11 +212,13 @@ def copied_along(
     angles = make_interp_spline(np.arange(example.frames), example.coordinates, k=3)(source)
     scale = body.leg_length / example.body.leg_length
     beside = _turned(example.coordinates[:, :3] - own.places, -own.headings)
+    beside[:, 1] -= own.climbs * beside[:, 0]
     relative = _yaw_matrices(-own.headings) @ exponential(example.coordinates[:, 3:6])
     clock = np.arange(example.frames, dtype=float)
     beside = make_interp_spline(clock, beside, k=3)(source) * [1, scale, 1]
     relative = slerp(relative, clock, np.clip(source, 0, example.frames - 1))
     angles[:, :3] = new.places + _turned(beside, new.headings)
+    angles[:, 1] += new.climbs * beside[:, 0]
     angles[:, 3:6], jumps = unroll(logarithm(_yaw_matrices(new.headings) @ relative))
     return Motion(
         id=id,
