@@ -267,7 +267,9 @@ def _under(
         place, normal = (
             np.where(higher[:, None], new, old) for new, old in ((beside, place), (tilted, normal))
         )
-    return place, normal
+    below = way.copy()  # straight below the way, whichever print the plane is of
+    below[:, 1] = _height(way, place, normal)
+    return below, normal
 
 
 def _height(way: Array, place: Array, normal: Array) -> Array:

@@ -55,7 +55,7 @@ class WarpSettings:
     start_m: float = 0.03
     unobserved_rad: float = 0.5
     foot_m: float = 3e-4
-    range_rad: float = 0.01
+    range_rad: float = 0.002
     iterations: int = 200
     tolerance: float = 1e-5
 
