@@ -6,6 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
 
 import motionstyle
 from motionstyle.configuration import load_config
@@ -66,6 +67,11 @@ try:
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
 
+if workflow.is_main_process:
+    LEFT_OUT = [row.id for row in read_syntheses(CONFIG["syntheses"]) if row.id not in SYNTHESES]
+    if LEFT_OUT:
+        logger.info(f"syntheses left out, clips not in {CONFIG['motions']}: {', '.join(LEFT_OUT)}")
+
 # Kept open while this run lasts: a run that was killed leaves locks, which the next one removes.
 ALIVE = forget_killed_runs(".snakemake") if workflow.is_main_process else None
 
@@ -94,18 +100,25 @@ wildcard_constraints:
     synthesis="|".join(SYNTHESES) or "none",
 
 
+# What the physics fit is made of in its room: other modules there do not touch it.
+PHYSICAL_MODULES = [
+    f"spacetime/{name}.py" for name in ("physical", "physical_problem", "forces", "splines")
+]
+
+
 @cache
 def room_digest(room):
-    """Return a digest of the sources of one room of the package."""
+    """Return a digest of the sources of one room, or one module, of the package."""
     digest = sha256()
-    for file in sorted(f for f in (PACKAGE / room).rglob("*") if f.suffix in {".py", ".j2"}):
+    files = [PACKAGE / room] if room.endswith(".py") else (PACKAGE / room).rglob("*")
+    for file in sorted(f for f in files if f.suffix in {".py", ".j2"}):
         if room or file.parent == PACKAGE:
             digest.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
     return digest.hexdigest()
 
 
 def library(*rooms):
-    """Return a digest of the package's sources in these rooms, as a parameter of a rule.
+    """Return a digest of the package's sources in these rooms or modules, for a rule's parameters.
 
     Snakemake reruns a job whose parameters changed, so an edit reruns what it touches.
     """
@@ -195,4 +208,9 @@ def everything():
     figures = [RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")]
     quality = [RESULTS / f"quality/{id}.json" for id in CLIPS]
     sidecars = [file.with_suffix(".json") for file in motions]
+    sidecars += [
+        RESULTS / f"footprints/{id}.{kind}"
+        for id in SYNTHESES
+        for kind in ("tsv", "json", "svg", "png")
+    ]
     return [*TABLES, RESULTS / "tables/claims.csv", *figures, *quality, *motions, *sidecars]

@@ -38,7 +38,7 @@ rule fit_physical:
     resources:
         mem_mb=1500,
     params:
-        library=library("body", "motion", "dynamics", "spacetime"),
+        library=library("body", "motion", "dynamics", *PHYSICAL_MODULES),
         physical=lambda wildcards: {
             **CONFIG["physical"],
             **(CONFIG["force_plates"] if wildcards.clip in PLATES else {}),
