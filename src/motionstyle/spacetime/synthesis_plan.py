@@ -157,6 +157,9 @@ def make_plan(
 ) -> Plan:
     """Return everything but the style: edited body and ranges, feet, and the start of §7.
 
+    Swinging feet keep above clean ground, even where the captured ones sink into it: only for
+    learning must the captured motion itself be feasible (`captured_constraints`).
+
     Parameters
     ----------
     example : its window, see `example_window`. footprints, frames : of `planned_footprints`.
@@ -164,11 +167,7 @@ def make_plan(
     edits: Edits = row.edits
     body = edit_body(example.body, edits)
     ranges = edit_ranges(example, edits)
-    same = row.footprints.kind == "captured" and not row.footprints.values.get("motion")
-    unscaled = edits.length_scale == 1.0
-    feet = to_constraints(
-        footprints, body, frames, example.rate_hz, like=example if same and unscaled else None
-    )
+    feet = to_constraints(footprints, body, frames, example.rate_hz)
     feet = edit_constraints(feet, edits)
     copied = copied_along(
         example, footprints, frames, example.rate_hz, id=f"{row.id}_copied", body=body
