@@ -10,6 +10,7 @@ import pytest
 from motionstyle.body.layout import COORDINATE_INDEX, COORDINATES
 from motionstyle.body.rotations import exponential, logarithm
 from motionstyle.evaluation import syntheses as measure
+from motionstyle.evaluation import synthesis_rows as rows
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.captured_footprints import footprints_of
 from motionstyle.spacetime.edits import Edits, edit_ranges
@@ -183,35 +184,35 @@ def moved(x=0.0, y=0.0):
 
 
 def test_foot_errors_and_depth(feet):
-    assert measure.foot_error_mm(WALK, feet) < 0.1
-    assert measure.depth_mm(WALK, feet) < 0.1
-    assert measure.foot_error_mm(moved(x=0.007), feet) == pytest.approx(7, abs=0.1)
-    assert measure.depth_mm(moved(y=-0.004), feet) == pytest.approx(4, abs=0.1)
+    assert rows.foot_error_mm(WALK, feet) < 0.1
+    assert rows.depth_mm(WALK, feet) < 0.1
+    assert rows.foot_error_mm(moved(x=0.007), feet) == pytest.approx(7, abs=0.1)
+    assert rows.depth_mm(moved(y=-0.004), feet) == pytest.approx(4, abs=0.1)
     allowed = replace(feet, clearance=np.full_like(feet.clearance, -0.01))
-    assert measure.depth_mm(moved(y=-0.004), allowed, allowed=True) == pytest.approx(4, abs=0.1)
+    assert rows.depth_mm(moved(y=-0.004), allowed, allowed=True) == pytest.approx(4, abs=0.1)
     free = replace(allowed, held=np.zeros_like(feet.held))
-    assert measure.depth_mm(moved(y=-0.004), free, allowed=True) == 0
+    assert rows.depth_mm(moved(y=-0.004), free, allowed=True) == 0
     sliding = replace(feet, sliding=feet.held)
-    assert measure.foot_error_mm(moved(x=0.5), sliding) < 0.1
-    assert measure.foot_error_mm(moved(y=0.003), sliding) == pytest.approx(3, abs=0.1)
+    assert rows.foot_error_mm(moved(x=0.5), sliding) < 0.1
+    assert rows.foot_error_mm(moved(y=0.003), sliding) == pytest.approx(3, abs=0.1)
 
 
 def test_friction_cone(feet):
     forces = np.where(feet.held[..., None], [70.0, 100.0, 0.0], 0.0)
-    assert measure.cone_excess_n(replace(WALK, contact_forces=forces), feet) == 0
+    assert rows.cone_excess_n(replace(WALK, contact_forces=forces), feet) == 0
     slippery = np.where(feet.held[..., None], [60.0, 100.0, 80.0], 0.0)
-    assert measure.cone_excess_n(replace(WALK, contact_forces=slippery), feet) == pytest.approx(20)
+    assert rows.cone_excess_n(replace(WALK, contact_forces=slippery), feet) == pytest.approx(20)
     pulled = -forces
-    assert measure.cone_excess_n(replace(WALK, contact_forces=pulled), feet) == pytest.approx(100)
+    assert rows.cone_excess_n(replace(WALK, contact_forces=pulled), feet) == pytest.approx(100)
     loose = np.where(feet.held[..., None], 0.0, [0.0, 30.0, 0.0])
-    assert measure.cone_excess_n(replace(WALK, contact_forces=loose), feet) == pytest.approx(30)
-    assert np.isnan(measure.cone_excess_n(WALK, feet))
+    assert rows.cone_excess_n(replace(WALK, contact_forces=loose), feet) == pytest.approx(30)
+    assert np.isnan(rows.cone_excess_n(WALK, feet))
 
 
 def test_joint_ranges():
     ranges = edit_ranges(WALK, Edits(locked={"elbow_flexion_l": 0}))
-    assert measure.range_excess_deg(WALK, ranges) == 0
-    assert measure.range_excess_deg(posed(elbow_flexion_l=3), ranges) == pytest.approx(2.5)
+    assert rows.range_excess_deg(WALK, ranges) == 0
+    assert rows.range_excess_deg(posed(elbow_flexion_l=3), ranges) == pytest.approx(2.5)
 
 
 def test_a_row_has_every_measured_column(feet):
@@ -220,10 +221,10 @@ def test_a_row_has_every_measured_column(feet):
     other = replace(posed(head_flexion=-20), provenance={"subject": "b"})
     forces = np.where(feet.held[..., None], [0.0, 100.0, 0.0], 0.0)
     motion = replace(WALK, contact_forces=forces)
-    row = measure.synthesis_measures(
+    row = rows.synthesis_measures(
         motion, feet, edit_ranges(WALK, Edits()), own=own, others=[same, other], captured=WALK
     )
-    assert set(row) <= set(measure.SYNTHESIS_COLUMNS)
+    assert set(row) <= set(rows.SYNTHESIS_COLUMNS)
     assert set(measure.MEASURES) <= set(row)
     assert row["cone_kept"] is True
     assert row["joint_ranges_kept"] is True

@@ -1,6 +1,6 @@
 """Measure one synthesis and its baselines: rows of the table of syntheses."""
 
-from motionstyle.evaluation.syntheses import synthesis_rows
+from motionstyle.evaluation.synthesis_rows import synthesis_rows
 from motionstyle.files import read_json, write_json
 from motionstyle.jobs import job
 from motionstyle.motion.storage import load_available, load_motion

@@ -1,6 +1,6 @@
 """Gather one row per synthesised motion and baseline."""
 
-from motionstyle.evaluation.syntheses import SYNTHESIS_COLUMNS
+from motionstyle.evaluation.synthesis_rows import SYNTHESIS_COLUMNS
 from motionstyle.files import read_json
 from motionstyle.jobs import job
 from motionstyle.tables import write_table

@@ -1,13 +1,12 @@
-"""What synthesised motions show, as the claims ask for it: lean, twist, swing, feet, forces.
+"""What synthesised motions show, as the claims ask for it: lean, twist, swing, flight, style.
 
-Pure functions of a motion (and, for soundness, of the constraints it was made under). Angles in
-degrees, lengths in cm or mm as the names say; nan where a motion does not show the quantity.
+Pure functions of a motion. Angles in degrees, lengths in cm, as the names say; nan where a motion
+does not show the quantity.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +22,6 @@ from motionstyle.evaluation.gait import (
 )
 from motionstyle.mocap.floor import runs
 from motionstyle.motion.motion import Motion
-from motionstyle.spacetime.foot_constraints import FootConstraints
-from motionstyle.spacetime.synthesis_plan import Plan
-from motionstyle.spacetime.synthesis_sheet import SynthesisRow
 
 Array = NDArray[np.float64]
 
@@ -33,8 +29,6 @@ GRAVITY = 9.81
 WIDEST_TURN_M = 15.0  # where the path's radius is larger, the motion does not turn
 LEAST_TURN_DEG = 20.0  # a motion whose path turns less from first to last does not turn at all
 UNLOADED_BW = 0.05  # a foot that bears less than this share of body weight flies
-CONE_TOLERANCE_N = 0.5
-RANGE_TOLERANCE_DEG = 0.1
 _UP = np.array([0.0, 1.0, 0.0])
 
 
@@ -245,33 +239,7 @@ def joint_rms_deg(motion: Motion, reference: Motion) -> float:
     return float(np.degrees(np.sqrt((away**2).mean())))
 
 
-# ----------------------------------------------------------------------------------- soundness
-def foot_errors_mm(motion: Motion, feet: FootConstraints) -> Array:
-    """Return how far each held point is from its target, or a sliding one from its surface."""
-    away = contact_points(motion.body, motion.pose()) - feet.targets
-    normal = np.abs((away * feet.normals).sum(axis=-1))
-    error = np.where(feet.sliding, normal, np.linalg.norm(away, axis=-1))
-    return 1000 * error[feet.held]
-
-
-def foot_error_mm(motion: Motion, feet: FootConstraints) -> float:
-    """Return the largest distance of a held point from its target."""
-    errors = foot_errors_mm(motion, feet)
-    return float(errors.max()) if len(errors) else 0.0
-
-
-def depth_mm(motion: Motion, feet: FootConstraints, *, allowed: bool = False) -> float:
-    """Return how deep the deepest foot point lies below its surface; 0 if none does.
-
-    allowed : count only what is deeper than the clearance allows (a captured motion's own sinking).
-    """
-    above = (contact_points(motion.body, motion.pose()) - feet.ground) * feet.normals
-    heights = above.sum(axis=-1)
-    if allowed:
-        heights = heights - np.where(feet.held, 0.0, np.minimum(feet.clearance, 0.0))
-    return 1000 * max(0.0, -float(heights.min()))
-
-
+# ----------------------------------------------------------------------------------------- feet
 def slide_cm(motion: Motion) -> float:
     """Return the median over contacts of the distance between a point's first and last place."""
     points = contact_points(motion.body, motion.pose())
@@ -283,25 +251,7 @@ def slide_cm(motion: Motion) -> float:
     return 100 * float(np.median(slides)) if slides else float("nan")
 
 
-def cone_excess_n(motion: Motion, feet: FootConstraints) -> float:
-    """Return by how much the worst contact force leaves its friction cone, N; nan without forces.
-
-    Pulling on the ground and pushing with a point that is not held count in full.
-    """
-    return (
-        float("nan") if motion.contact_forces is None else feet.cone_excess(motion.contact_forces)
-    )
-
-
-def range_excess_deg(motion: Motion, ranges: Array) -> float:
-    """Return by how much the worst joint angle leaves its range (35, 2)."""
-    q = motion.coordinates
-    excess = np.maximum(ranges[:, 0] - q, q - ranges[:, 1])[:, JOINT_COORDINATES]
-    return float(np.degrees(max(0.0, float(excess.max()))))
-
-
-# --------------------------------------------------------------------------------------- rows
-MEASURES = {
+MEASURES: dict[str, Callable[[Motion], float]] = {
     "lean_to_centre_deg": lean_to_centre_deg,
     "lean_over_balance_ratio": lean_over_balance_ratio,
     "lean_left_deg": lean_left_deg,
@@ -316,111 +266,3 @@ MEASURES = {
     "peak_normal_force_bw": peak_normal_force_bw,
     "slide_cm": slide_cm,
 }
-SYNTHESIS_COLUMNS = (
-    *("config", "id", "kind", "experiment", "task", "example", "style", "mood", "action"),
-    *("subject", "data", "status", "reason", "frames", "rate_hz", "seconds", "iterations"),
-    *("E", "optimality", "root_share_of_E_pct"),
-    *("foot_error_mm", "foot_rms_mm", "penetration_mm", "penetration_beyond_clearance_mm"),
-    *("cone_excess_n", "cone_kept", "joint_range_excess_deg", "joint_ranges_kept"),
-    *MEASURES,
-    *("style_distance_own_deg", "closer_to_own_style", "closer_to_own_subject"),
-    "joint_rms_to_captured_deg",
-)
-
-
-def synthesis_measures(
-    motion: Motion,
-    feet: FootConstraints,
-    ranges: Array,
-    *,
-    own: Motion | None = None,
-    others: Sequence[Motion] = (),
-    captured: Motion | None = None,
-) -> dict[str, object]:
-    """Return the measured columns of a row of `tables/syntheses.csv`.
-
-    Parameters
-    ----------
-    feet, ranges : what the motion was made under.
-    own : the captured motion of the style's clip. others : captured motions of other styles, or of
-        the same style by other subjects.
-    captured : the captured motion with the same footprints, if there is one.
-    """
-    errors = foot_errors_mm(motion, feet)
-    cone, excess = cone_excess_n(motion, feet), range_excess_deg(motion, ranges)
-    row: dict[str, object] = {
-        "frames": motion.frames,
-        "rate_hz": motion.rate_hz,
-        "foot_error_mm": foot_error_mm(motion, feet),
-        "foot_rms_mm": float(np.sqrt((errors**2).mean())) if len(errors) else 0.0,
-        "penetration_mm": depth_mm(motion, feet),
-        "penetration_beyond_clearance_mm": depth_mm(motion, feet, allowed=True),
-        "cone_excess_n": cone,
-        "cone_kept": None if np.isnan(cone) else cone <= CONE_TOLERANCE_N,
-        "joint_range_excess_deg": excess,
-        "joint_ranges_kept": excess <= RANGE_TOLERANCE_DEG,
-        **{name: measure(motion) for name, measure in MEASURES.items()},
-    }
-    if captured is not None:
-        row["joint_rms_to_captured_deg"] = joint_rms_deg(motion, captured)
-    if own is None:
-        return row
-    row["style_distance_own_deg"] = style_distance_deg(motion, own)
-    subject = own.provenance.get("subject")
-    same = [one for one in others if one.provenance.get("subject") == subject]
-    foreign = [one for one in others if one.provenance.get("subject") != subject]
-    row["closer_to_own_style"] = closer_to_own(motion, own, same)
-    row["closer_to_own_subject"] = closer_to_own(motion, own, foreign)
-    return row
-
-
-def synthesis_rows(
-    row: SynthesisRow,
-    plan: Plan | None,
-    motions: Mapping[str, Motion],
-    reports: Mapping[str, Mapping[str, Any]],
-    config: str,
-    *,
-    own: Motion | None,
-    others: Sequence[Motion],
-    captured: Motion | None,
-) -> list[dict[str, object]]:
-    """Return the rows of one synthesis: the motion itself (`nio`), `warp` and `copied`.
-
-    Parameters
-    ----------
-    plan : None where the footprints have failed; the rows then give the reason.
-    motions : by kind, those that could be made. reports : of the solvers, by kind.
-    own, others, captured : see `synthesis_measures`.
-    """
-    about = own.provenance if own is not None else {}
-    rows = []
-    for kind in ("nio", "warp", "copied"):
-        report = reports.get(kind, reports["warp"] if kind == "copied" else {})
-        result: dict[str, object] = {
-            "config": config,
-            "id": row.id,
-            "kind": kind,
-            "task": row.task,
-            "example": row.example,
-            "style": row.style,
-            "mood": row.mood,
-            "action": about.get("action"),
-            "subject": about.get("subject"),
-            "data": "captured",
-        }
-        if plan is not None and kind in motions:
-            result |= synthesis_measures(
-                motions[kind], plan.feet, plan.ranges, own=own, others=others, captured=captured
-            )
-        if kind != "copied":
-            known = {name: report[name] for name in SYNTHESIS_COLUMNS if name in report}
-            result |= known
-        elif kind in motions:
-            result["status"] = "ok"
-        else:
-            result |= {"status": "failed", "reason": report.get("reason")}
-        if "cone_excess_n" in report:
-            result["cone_kept"] = report["cone_excess_n"] <= CONE_TOLERANCE_N
-        rows += [{**result, "experiment": one} for one in row.experiment or ("",)]
-    return rows
