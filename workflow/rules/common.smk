@@ -67,6 +67,17 @@ try:
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
 
+# Syntheses on a ramp, each with the one on the level in the same style and window.
+RAMPS = [
+    (ramp.id, level.id)
+    for ramp in SYNTHESES.values()
+    for level in SYNTHESES.values()
+    if ramp.footprints.kind == "ramp"
+    and level.task == "same_footprints"
+    and ramp.style == level.style
+    and (ramp.example, ramp.first_frame, ramp.last_frame)
+    == (level.example, level.first_frame, level.last_frame)
+]
 if workflow.is_main_process:
     LEFT_OUT = [row.id for row in read_syntheses(CONFIG["syntheses"]) if row.id not in SYNTHESES]
     if LEFT_OUT:
@@ -190,7 +201,7 @@ TABLES = [
     RESULTS / f"tables/{name}.csv"
     for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
 ]
-TABLES += [RESULTS / "tables/syntheses.csv"]
+TABLES += [RESULTS / f"tables/{name}.csv" for name in ("syntheses", "ramp_gait")]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {

@@ -150,3 +150,27 @@ rule syntheses_table:
         library=library("evaluation"),
     script:
         "../scripts/syntheses_table.py"
+
+
+rule ramp_gait_table:
+    input:
+        nio=[MOTIONS / f"nio/{id}.npz" for pair in RAMPS for id in pair],
+        warp=[MOTIONS / f"warp/{id}.npz" for pair in RAMPS for id in pair],
+        code=RESULTS / "dynamics/library.json",
+    output:
+        table=RESULTS / "tables/ramp_gait.csv",
+    log:
+        LOGS / "ramp_gait_table.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "dynamics", "spacetime", "evaluation"),
+        sheet=CONFIG["syntheses"],
+        pairs=RAMPS,
+        folder=str(MOTIONS),
+        config=CONFIG["name"],
+    script:
+        "../scripts/ramp_gait_table.py"

@@ -48,10 +48,12 @@ class Synthesis:
     trace: list[dict[str, float]]
 
 
-def initial_style_of(
-    motion: Motion, functions: Mapping[str, FrameFunction], *, frames_per_knot: float = 2.0
-) -> Style:
-    """Return the style that learning starts from (nio.md A3), for a physical motion.
+def net_torques(
+    motion: Motion, functions: Mapping[str, FrameFunction], frames_per_knot: float = 2.0
+) -> tuple[Array, Array, Array]:
+    """Return q, q̇ of the splines through a motion, and inertia − gravity − contacts, (F, 35) each.
+
+    The last is what muscles, springs and shoes together exert; at the root what nobody does.
 
     Raises
     ------
@@ -66,6 +68,20 @@ def initial_style_of(
     q, qd, qdd = basis.evaluate(basis.fit(motion.coordinates))
     forces = motion.contact_forces.reshape(motion.frames, -1)
     tau = functions["forces"](q, qd, qdd, forces, parameter_vector(motion.body))[0]
+    return q, qd, tau
+
+
+def initial_style_of(
+    motion: Motion, functions: Mapping[str, FrameFunction], *, frames_per_knot: float = 2.0
+) -> Style:
+    """Return the style that learning starts from (nio.md A3), for a physical motion.
+
+    Raises
+    ------
+    MotionStyleError
+        If the motion's contact forces are unknown.
+    """
+    q, qd, tau = net_torques(motion, functions, frames_per_knot)
     joints = JOINT_COORDINATES
     style = initial_style(q[:, joints], qd[:, joints], tau[:, joints], USUAL_SHOES)
     about = {"recipe": "initial", "clip": motion.id, "solver_status": "not needed"}
