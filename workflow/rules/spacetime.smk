@@ -170,7 +170,6 @@ rule ramp_gait_table:
         library=library("body", "motion", "dynamics", "spacetime", "evaluation"),
         sheet=CONFIG["syntheses"],
         pairs=RAMPS,
-        folder=str(MOTIONS),
         config=CONFIG["name"],
     script:
         "../scripts/ramp_gait_table.py"

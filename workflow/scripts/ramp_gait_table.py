@@ -16,9 +16,9 @@ with job(snakemake.log[0]):
     functions = load_functions(dynamics_functions(), Path(snakemake.input.code))
     sheet = {row.id: row for row in read_syntheses(params.sheet)}
     rows = []
-    for ramp, level in params.pairs:
+    for number, (ramp, level) in enumerate(params.pairs):
         for kind in ("nio", "warp"):
-            files = [Path(params.folder) / kind / f"{id}.npz" for id in (ramp, level)]
+            files = snakemake.input[kind][2 * number : 2 * number + 2]
             found = load_available(files, allow_none=True)
             slope = sheet[ramp].footprints.number("slope_deg")
             states = [read_sidecar(f)["provenance"].get("solver_status", "failed") for f in files]
