@@ -23,7 +23,7 @@ from synthetic_walk import make_walk
 
 def row_of(**edits):
     return SynthesisRow(
-        "made", (), "same_footprints", "walk", "initial", "neutral", FootprintSource(),
+        "made", None, "same_footprints", "walk", "initial", "neutral", FootprintSource(),
         Edits(**edits), None, None, (), None, 2, None,
     )  # fmt: skip
 

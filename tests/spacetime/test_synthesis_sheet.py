@@ -59,7 +59,7 @@ def test_the_sheets_that_are_shipped_are_sound(path):
 def test_cells_become_values(tmp_path):
     row = one(
         tmp_path,
-        experiment="nio-E4,nio-E7",
+        experiment="nio-E4",
         style="initial:run",
         footprints="arc radius_m=2.5 side=right slide=yes",
         edits="load=suitcase lock.knee_flexion_l=5 narrow.hip_flexion_l=0.5 shoe_stiffness=2",
@@ -67,7 +67,7 @@ def test_cells_become_values(tmp_path):
         last_frame="60",
         others="x,y",
     )
-    assert row.experiment == ("nio-E4", "nio-E7")
+    assert row.experiment == "nio-E4"
     assert (row.recipe, row.style_clip, row.clips) == ("initial", "run", ("walk", "run"))
     assert row.footprints.slide
     assert row.footprints.number("radius_m") == 2.5

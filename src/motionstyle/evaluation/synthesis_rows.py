@@ -153,13 +153,14 @@ def synthesis_rows(
             "config": config,
             "id": row.id,
             "kind": kind,
+            "experiment": row.experiment,
             "task": row.task,
             "example": row.example,
             "style": row.style,
             "mood": row.mood,
             "action": about.get("action"),
             "subject": about.get("subject"),
-            "data": "captured",
+            "data": "planted" if row.recipe == "twin" else "captured",
         }
         if plan is not None and kind in motions:
             result |= synthesis_measures(
@@ -174,5 +175,5 @@ def synthesis_rows(
             result |= {"status": "failed", "reason": report.get("reason")}
         if "cone_excess_n" in report:
             result["cone_kept"] = report["cone_excess_n"] <= CONE_TOLERANCE_N
-        rows += [{**result, "experiment": one} for one in row.experiment or ("",)]
+        rows.append(result)
     return rows

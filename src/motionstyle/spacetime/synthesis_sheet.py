@@ -71,7 +71,7 @@ class SynthesisRow:
 
     Attributes
     ----------
-    id : name of the motion. experiment : ids of the checklist it belongs to, comma-separated.
+    id : name of the motion. experiment : the claim it serves, if it serves one alone.
     task : one of `TASKS`. example : clip whose motion is copied and whose style it is by default.
     style : `initial`, `hand`, `twin`, or a learner's name, and after a colon the clip it was made
         from, if that is not the example.
@@ -82,7 +82,7 @@ class SynthesisRow:
     """
 
     id: str
-    experiment: tuple[str, ...]
+    experiment: str | None
     task: str
     example: str
     style: str
@@ -186,7 +186,7 @@ def _row(cells: Cells, folder: Path) -> SynthesisRow:
     cells.required("task")
     row = SynthesisRow(
         id=cells.identifier("id"),
-        experiment=tuple(filter(None, (cells.text("experiment") or "").split(","))),
+        experiment=cells.text("experiment"),
         task=cells.one_of("task", TASKS) or TASKS[0],
         example=cells.required("example"),
         style=style or STYLES[0],
