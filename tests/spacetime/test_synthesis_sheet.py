@@ -56,6 +56,14 @@ def test_the_sheets_that_are_shipped_are_sound(path):
         assert (slope < 0) == (row.task == "ramp_down")
 
 
+@pytest.mark.parametrize("kind", ["", ".full"])
+def test_shipped_sheets_name_clips_of_the_shipped_motion_sheets(kind):
+    folder = SHEETS[0].parent
+    motions = folder / f"motions{kind or '.embedded'}.tsv"
+    clips = [line.split("\t")[0] for line in motions.read_text(encoding="utf-8").splitlines()]
+    assert read_syntheses(folder / f"syntheses{kind}.tsv", clips)
+
+
 def test_cells_become_values(tmp_path):
     row = one(
         tmp_path,

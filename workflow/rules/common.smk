@@ -58,10 +58,12 @@ try:
         for recipe in read_planted(CONFIG["planted"])
         if recipe.base in CLIPS and CLIPS[recipe.base].dataset == EMBEDDED
     }
-    # Motions are synthesised from clips of the sheet; rows whose clips it has not are left out.
+    # Motions are synthesised from clips of the sheet. Of the sheets that are shipped, rows whose
+    # clips it has not are left out; in the user's own they are mistakes.
+    SHIPPED = Path(CONFIG["syntheses"]).resolve().parent == (ROOT / "config").resolve()
     SYNTHESES = {
         row.id: row
-        for row in read_syntheses(CONFIG["syntheses"])
+        for row in read_syntheses(CONFIG["syntheses"], None if SHIPPED else CLIPS)
         if all(id in CLIPS for id in (*row.clips, *row.others))
     }
 except MotionStyleError as error:

@@ -15,8 +15,9 @@ with job(snakemake.log[0]):
         "warp": read_json(inputs.warp_report),
     }
     made = {}
-    plan = captured = own = None
-    others = []
+    plan = captured = None
+    own = next(iter(load_available([inputs.own], allow_none=True)), None)
+    others = load_available(inputs.others, allow_none=True)
     if read_json(inputs.status)["status"] == "ok":
         example = example_window(load_motion(inputs.example), row)
         plan = load_plan(row, example, inputs.table, inputs.status)
@@ -26,8 +27,6 @@ with job(snakemake.log[0]):
         captured = example if row.footprint_clip else None
         if "source" in dict(inputs.items()):
             captured = load_motion(inputs.source)
-        own = next(iter(load_available([inputs.own], allow_none=True)), None)
-        others = load_available(inputs.others, allow_none=True)
     rows = synthesis_rows(
         row, plan, made, reports, snakemake.params.config, own=own, others=others, captured=captured
     )

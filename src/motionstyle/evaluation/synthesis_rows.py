@@ -173,6 +173,8 @@ def synthesis_rows(
             result["status"] = "ok"
         else:
             result |= {"status": "failed", "reason": report.get("reason")}
+        if result.get("reason"):
+            result["reason"] = "; ".join(str(result["reason"]).splitlines())
         if "cone_excess_n" in report:
             result["cone_kept"] = report["cone_excess_n"] <= CONE_TOLERANCE_N
         rows.append(result)
