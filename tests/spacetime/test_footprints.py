@@ -187,3 +187,17 @@ def test_foot_shape_of_a_bent_toe_is_flat_in_its_print(plain_body):
     for pose in print_poses(rows, motion.body, motion.rate_hz):
         toe = [r for r in pose.rows if r.point == "toe"]
         assert all(r.y == pytest.approx(0, abs=1e-9) for r in toe)
+
+
+def test_a_toe_that_leaves_as_the_heel_meets_the_next_step_is_another_print():
+    motion = make_walk(100)
+    contacts = np.zeros_like(motion.contacts)
+    toe, heel = CONTACT_POINTS.index("toe_r"), CONTACT_POINTS.index("heel_r")
+    contacts[0:30, toe] = True
+    contacts[30:60, heel] = True
+    q = motion.coordinates.copy()
+    q[30:, 0] += 0.4
+    rows = footprints_of(replace(motion, coordinates=q, contacts=contacts))
+    assert [(r.point, r.t_on) for r in rows] == [("toe", 0.0), ("heel", 0.3)]
+    poses = print_poses(rows, motion.body, motion.rate_hz)
+    assert len(poses) == 2

@@ -39,6 +39,13 @@ def test_own_footprints_give_the_example_back():
     assert (motion.contacts == WALK.contacts).all()
 
 
+def test_the_papers_start_has_its_root_on_the_spline():
+    motion = copied_along(WALK, ROWS, WALK.frames, RATE, id="copied", on_the_way=True)
+    way = root_way(ROWS, WALK.body, WALK.frames, RATE)
+    assert motion.coordinates[:, [0, 2]] == pytest.approx(way.places[:, [0, 2]], abs=1e-9)
+    assert motion.coordinates[:, 6:] == pytest.approx(WALK.coordinates[:, 6:], abs=1e-9)
+
+
 def test_slower_is_the_same_movement_over_more_time():
     motion, rows = copied(frames=450, time_scale=1.5)
     assert foot_errors(motion, rows).max() < 0.03

@@ -20,6 +20,7 @@ from motionstyle.mocap.floor import runs
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.footprints import (
     GROUPS,
+    ONE_PRINT_M,
     Footprint,
     Sole,
     numbered,
@@ -57,20 +58,39 @@ def footprints_of(motion: Motion, shape: Shape = "rigid") -> tuple[Footprint, ..
         columns = {p: CONTACT_POINTS.index(f"{p}_{foot}") for p in GROUPS["foot"]}
         sole = sole_of(motion.body, foot)
         for first, last in runs(motion.contacts[:, list(columns.values())].any(axis=1)):
-            stance = [
+            found = [
                 _Run(p, first + a, first + b, points[first + a : first + b + 1, k].mean(axis=0))
                 for p, k in columns.items()
                 for a, b in runs(motion.contacts[first : last + 1, k])
             ]
-            normal = _stance_normal(motion, columns, first, last)
             yaw = _yaw(points, motion, columns, (first, last))
-            if shape == "own":
-                rows += [_row(foot, r, r.place, (yaw, normal), motion.rate_hz) for r in stance]
-            else:
-                rows += _rigid(foot, stance, sole, (yaw, normal), motion.rate_hz)
+            for stance in _prints(found, sole, yaw):
+                span = min(r.first for r in stance), max(r.last for r in stance)
+                normal = _stance_normal(motion, columns, *span)
+                yaw = _yaw(points, motion, columns, span)
+                if shape == "own":
+                    rows += [_row(foot, r, r.place, (yaw, normal), motion.rate_hz) for r in stance]
+                else:
+                    rows += _rigid(foot, stance, sole, (yaw, normal), motion.rate_hz)
     order = {name: k for k, name in enumerate(GROUPS)}
     rows.sort(key=lambda one: (one.t_on, one.foot, order[one.point]))
     return numbered(rows)
+
+
+def _prints(stance: list[_Run], sole: Sole, yaw: float) -> list[list[_Run]]:
+    """Part the runs of a stance by print: a toe may leave one step as the heel meets the next."""
+    forward, right = print_axes(yaw, np.array([0.0, 1.0, 0.0]))
+    prints: list[tuple[Array, list[_Run]]] = []
+    for run in sorted(stance, key=lambda run: (run.first, run.last)):
+        ahead, aside = sole.points[run.point]
+        heel = run.place - ahead * forward - aside * right
+        for place, members in prints:
+            if np.linalg.norm(heel - place) < ONE_PRINT_M:
+                members.append(run)
+                break
+        else:
+            prints.append((heel, [run]))
+    return [members for _place, members in prints]
 
 
 def _row(

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from motionstyle.body.body import Body
 from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.footprint_constraints import (
-    ONE_PRINT_M,
     PrintPose,
     frames_of,
     heel_of,
     print_poses,
 )
 from motionstyle.spacetime.footprints import (
+    ONE_PRINT_M,
     SIDES,
     Footprint,
     labels,

@@ -23,6 +23,7 @@ from motionstyle.spacetime.captured_footprints import footprints_of
 from motionstyle.spacetime.foot_constraints import FootConstraints
 from motionstyle.spacetime.footprints import (
     GROUPS,
+    ONE_PRINT_M,
     Footprint,
     Sole,
     points_of,
@@ -34,7 +35,6 @@ Array = NDArray[np.float64]
 
 FRICTION = 0.8  # dry shoe on a floor
 SLIDING_FRICTION = 0.02  # a skate on ice
-ONE_PRINT_M = 0.1  # rows of a foot whose heels lie farther apart are different prints
 EDGE_MARGIN_M = 0.04  # how far before and behind an edge a swinging foot keeps to the upper step
 USUAL_SWING_S = 0.4  # of a swing cut off by the motion's ends
 

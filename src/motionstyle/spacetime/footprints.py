@@ -40,6 +40,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "toe": ("toe",),
     "foot": ("heel", "ball_medial", "ball_lateral", "toe"),
 }
+ONE_PRINT_M = 0.1  # rows of a foot whose heels lie farther apart are different prints
 HEADER_LINES = 2  # of a written file: the units and the names of the columns
 
 

@@ -193,6 +193,7 @@ def copied_along(
     *,
     id: str,
     body: Body | None = None,
+    on_the_way: bool = False,
 ) -> Motion:
     """Return the example copied along new footprints: the start of §7, and a baseline by itself.
 
@@ -203,6 +204,7 @@ def copied_along(
     frames : of the new motion.
     id : of the new motion, kind `warp`.
     body : whose motion it is to be; the example's by default. Root heights scale with the legs.
+    on_the_way : put the root on the spline itself, as the paper does, not beside it.
     """
     body = body or example.body
     constraints = to_constraints(footprints, body, frames, rate_hz)
@@ -216,6 +218,8 @@ def copied_along(
     relative = _yaw_matrices(-own.headings) @ exponential(example.coordinates[:, 3:6])
     clock = np.arange(example.frames, dtype=float)
     beside = make_interp_spline(clock, beside, k=3)(source) * [1, scale, 1]
+    if on_the_way:
+        beside[:, [0, 2]] = 0.0
     relative = slerp(relative, clock, np.clip(source, 0, example.frames - 1))
     angles[:, :3] = new.places + _turned(beside, new.headings)
     angles[:, 1] += new.climbs * beside[:, 0]
