@@ -69,6 +69,8 @@ try:
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
 
+# The first synthesis of each task, for figures.
+ONE_OF_EACH_TASK = list({row.task: row.id for row in reversed(SYNTHESES.values())}.values())[::-1]
 # Syntheses on a ramp, each with the one on the level in the same style and window.
 RAMPS = [
     (ramp.id, level.id)
@@ -213,6 +215,7 @@ SHOWN = {
 FIGURES = ["body", "strips", "gait", "markers"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates"] if PLATES else []
+FIGURES += ["syntheses", "warps"] if SYNTHESES else []
 
 
 def everything():

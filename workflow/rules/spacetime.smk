@@ -173,3 +173,32 @@ rule ramp_gait_table:
         config=CONFIG["name"],
     script:
         "../scripts/ramp_gait_table.py"
+
+
+rule figure_syntheses:
+    input:
+        motions=[MOTIONS / f"nio/{id}.npz" for id in ONE_OF_EACH_TASK],
+    output:
+        svg=RESULTS / "figures/syntheses.svg",
+        png=RESULTS / "figures/syntheses.png",
+    log:
+        LOGS / "figures/syntheses.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        library=library("body", "motion", "evaluation", "figures"),
+    script:
+        "../scripts/figure_syntheses.py"
+
+
+use rule figure_syntheses as figure_warps with:
+    input:
+        motions=[MOTIONS / f"warp/{id}.npz" for id in ONE_OF_EACH_TASK],
+    output:
+        svg=RESULTS / "figures/warps.svg",
+        png=RESULTS / "figures/warps.png",
+    log:
+        LOGS / "figures/warps.log",
