@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.captured_footprints import footprints_of
 from motionstyle.spacetime.edits import Edits, edit_ranges
 from motionstyle.spacetime.footprint_constraints import to_constraints
+from motionstyle.spacetime.synthesis_plan import make_plan, planned_footprints
+from motionstyle.spacetime.synthesis_sheet import FootprintSource, SynthesisRow
 from synthetic_walk import RATE, make_body, make_walk
 
 WALK = make_walk()
@@ -231,3 +234,45 @@ def test_a_row_has_every_measured_column(feet):
     assert row["closer_to_own_style"] is True
     assert row["closer_to_own_subject"] is True
     assert row["joint_rms_to_captured_deg"] == 0
+
+
+def sheet_row(**cells):
+    known = {
+        **{"id": "up", "experiment": None, "task": "ramp_up", "example": "walk"},
+        **{"style": "initial", "mood": "sad", "footprints": FootprintSource(), "edits": Edits()},
+        **{"first_frame": None, "last_frame": None, "others": (), "note": None},
+        **{"row": 2, "folder": Path()},
+    }
+    return SynthesisRow(**known | cells)
+
+
+def test_one_row_for_the_synthesis_and_each_baseline():
+    row = sheet_row()
+    plan = make_plan(row, WALK, *planned_footprints(row, WALK))
+    own = replace(WALK, provenance={"subject": "a", "action": "walk"})
+    reports = {
+        "nio": {"status": "converged", "E": 5.0, "root_share_of_E_pct": 0.1, "cone_excess_n": 0.1},
+        "warp": {"status": "converged", "iterations": 3},
+    }
+    motions = {"nio": WALK, "warp": WALK, "copied": plan.copied}
+    found = rows.synthesis_rows(
+        row, plan, motions, reports, "default", own=own, others=[], captured=None
+    )
+    assert [one["kind"] for one in found] == ["nio", "warp", "copied"]
+    assert [one["status"] for one in found] == ["converged", "converged", "ok"]
+    for one in found:
+        assert set(one) <= set(rows.SYNTHESIS_COLUMNS)
+        assert (one["subject"], one["action"], one["mood"]) == ("a", "walk", "sad")
+    assert found[0]["E"] == 5.0
+    assert found[0]["cone_kept"] is True
+    assert "E" not in found[2]
+
+
+def test_footprints_that_failed_are_rows_with_their_reason():
+    failed = {"status": "failed", "reason": "too far\ntoo high"}
+    reports = {"nio": failed, "warp": failed}
+    found = rows.synthesis_rows(
+        sheet_row(), None, {}, reports, "default", own=WALK, others=[], captured=None
+    )
+    for one in found:
+        assert (one["status"], one["reason"]) == ("failed", "too far; too high")
