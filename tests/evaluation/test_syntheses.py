@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -266,6 +267,8 @@ def test_one_row_for_the_synthesis_and_each_baseline():
     assert found[0]["E"] == 5.0
     assert found[0]["cone_kept"] is True
     assert "E" not in found[2]
+    assert found[0]["lean_to_centre_deg"] is None  # a straight walk; JSON knows no nan
+    json.dumps(found, allow_nan=False)
 
 
 def test_footprints_that_failed_are_rows_with_their_reason():

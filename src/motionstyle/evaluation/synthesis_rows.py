@@ -177,5 +177,9 @@ def synthesis_rows(
             result["reason"] = "; ".join(str(result["reason"]).splitlines())
         if "cone_excess_n" in report:
             result["cone_kept"] = report["cone_excess_n"] <= CONE_TOLERANCE_N
-        rows.append(result)
+        rows.append({k: None if _is_nan(v) else v for k, v in result.items()})
     return rows
+
+
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and np.isnan(value)
