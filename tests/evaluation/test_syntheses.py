@@ -62,6 +62,7 @@ def test_lean_on_a_circle_is_the_one_put_in(lean):
 def test_balance_on_a_circle_is_atan_of_v2_over_rg():
     expected = np.degrees(np.arctan(1.5**2 / (2.0 * 9.81)))
     motion = gliding(radius=2.0, lean_deg=expected)
+    assert measure.turn_radius_m(motion) == pytest.approx(2.0, rel=1e-6)
     assert measure.balance_lean_deg(motion) == pytest.approx(expected, rel=0.05)
     assert measure.lean_over_balance_ratio(motion) == pytest.approx(1.0, rel=0.07)
 

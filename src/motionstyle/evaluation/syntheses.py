@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 GRAVITY = 9.81
 WIDEST_TURN_M = 15.0  # where the path's radius is larger, the motion does not turn
-LEAST_TURN_DEG = 20.0  # a motion whose path turns less from first to last does not turn at all
+LEAST_TURN_DEG = 10.0  # a motion whose path turns less from first to last does not turn at all
 UNLOADED_BW = 0.05  # a foot that bears less than this share of body weight flies
 _UP = np.array([0.0, 1.0, 0.0])
 
@@ -77,14 +77,31 @@ def lean_to_centre_deg(motion: Motion) -> float:
     return float((lateral_leans(motion)[turning] * np.sign(rates.sum())).mean())
 
 
+def turn_radius_m(motion: Motion) -> float:
+    """Return the radius of the circle through the pelvis' path where it turns; nan if it does not.
+
+    Least squares on x² + z² = 2ax + 2bz + c, so that the sway of single steps averages out.
+    """
+    turning = turning_frames(motion)
+    if turning.sum() < 3:
+        return float("nan")
+    path = motion.coordinates[turning][:, [0, 2]]
+    middle = path.mean(axis=0)
+    x, z = (path - middle).T
+    a, b, c = np.linalg.lstsq(
+        np.column_stack([2 * x, 2 * z, np.ones(len(x))]), x**2 + z**2, rcond=None
+    )[0]
+    return float(np.sqrt(max(c + a**2 + b**2, 0.0)))
+
+
 def balance_lean_deg(motion: Motion) -> float:
     """Return atan(v²/(r g)) of the turn: mean speed and radius over the frames that turn."""
     turning = turning_frames(motion)
     if not turning.any():
         return float("nan")
     speed = np.linalg.norm(np.gradient(smooth_path(motion), 1 / motion.rate_hz, axis=0), axis=1)
-    v, rate = float(speed[turning].mean()), abs(float(turn_rates(motion)[turning].mean()))
-    return float(np.degrees(np.arctan2(v * rate, GRAVITY)))  # v²/r = v·ω
+    v = float(speed[turning].mean())
+    return float(np.degrees(np.arctan2(v**2, GRAVITY * turn_radius_m(motion))))
 
 
 def lean_over_balance_ratio(motion: Motion) -> float:
