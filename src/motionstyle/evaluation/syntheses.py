@@ -16,6 +16,7 @@ from motionstyle.body.layout import COORDINATE_INDEX, COORDINATES, JOINT_COORDIN
 from motionstyle.evaluation.gait import (
     clinical_angles,
     gait_cycles,
+    mean_speed,
     normalised_cycles,
     smooth_path,
     travel_directions,
@@ -78,14 +79,14 @@ def lean_to_centre_deg(motion: Motion) -> float:
 
 
 def turn_radius_m(motion: Motion) -> float:
-    """Return the radius of the circle through the pelvis' path where it turns; nan if it does not.
+    """Return the radius of the circle through the whole path of the pelvis; nan if it is straight.
 
-    Least squares on x² + z² = 2ax + 2bz + c, so that the sway of single steps averages out.
+    Least squares on x² + z² = 2ax + 2bz + c, over all frames, so that the sway of single steps
+    averages out; for motions that turn all the way.
     """
-    turning = turning_frames(motion)
-    if turning.sum() < 3:
+    if not turning_frames(motion).any():
         return float("nan")
-    path = motion.coordinates[turning][:, [0, 2]]
+    path = motion.coordinates[:, [0, 2]]
     middle = path.mean(axis=0)
     x, z = (path - middle).T
     a, b, c = np.linalg.lstsq(
@@ -95,13 +96,9 @@ def turn_radius_m(motion: Motion) -> float:
 
 
 def balance_lean_deg(motion: Motion) -> float:
-    """Return atan(v²/(r g)) of the turn: mean speed and radius over the frames that turn."""
-    turning = turning_frames(motion)
-    if not turning.any():
-        return float("nan")
-    speed = np.linalg.norm(np.gradient(smooth_path(motion), 1 / motion.rate_hz, axis=0), axis=1)
-    v = float(speed[turning].mean())
-    return float(np.degrees(np.arctan2(v**2, GRAVITY * turn_radius_m(motion))))
+    """Return atan(v²/(r g)) of a motion that turns all the way: mean speed, and `turn_radius_m`."""
+    radius = turn_radius_m(motion)
+    return float(np.degrees(np.arctan(mean_speed(motion) ** 2 / (radius * GRAVITY))))
 
 
 def lean_over_balance_ratio(motion: Motion) -> float:
