@@ -109,6 +109,7 @@ def test_cells_become_values(tmp_path):
         ({"edits": "friction=0.1 friction=0.2"}, "friction stands there twice"),
         ({"first_frame": "5", "last_frame": "9"}, "at least 8 frames"),
         ({"example": ""}, "column example: empty"),
+        ({"id": "a_copied"}, "column id: 'a_copied' ends in '_copied'"),
         ({"id": "a b"}, "column id: 'a b' may have only"),
     ],
 )

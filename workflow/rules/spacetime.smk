@@ -34,7 +34,7 @@ rule warp:
         warped_sidecar=MOTIONS / "warp/{synthesis}.json",
         copied=MOTIONS / "warp/{synthesis}_copied.npz",
         copied_sidecar=MOTIONS / "warp/{synthesis}_copied.json",
-        report=RESULTS / "syntheses/{synthesis}_warp.json",
+        report=RESULTS / "syntheses/warp/{synthesis}.json",
     log:
         LOGS / "warp/{synthesis}.log",
     benchmark:
@@ -83,7 +83,7 @@ rule synthesise:
     output:
         motion=MOTIONS / "nio/{synthesis}.npz",
         sidecar=MOTIONS / "nio/{synthesis}.json",
-        report=RESULTS / "syntheses/{synthesis}_nio.json",
+        report=RESULTS / "syntheses/nio/{synthesis}.json",
     log:
         LOGS / "synthesise/{synthesis}.log",
     benchmark:
@@ -109,8 +109,8 @@ rule measure_synthesis:
         nio=MOTIONS / "nio/{synthesis}.npz",
         warp=MOTIONS / "warp/{synthesis}.npz",
         copied=MOTIONS / "warp/{synthesis}_copied.npz",
-        nio_report=RESULTS / "syntheses/{synthesis}_nio.json",
-        warp_report=RESULTS / "syntheses/{synthesis}_warp.json",
+        nio_report=RESULTS / "syntheses/nio/{synthesis}.json",
+        warp_report=RESULTS / "syntheses/warp/{synthesis}.json",
         own=lambda wildcards: MOTIONS
         / "captured/{0.style_clip}.npz".format(SYNTHESES[wildcards.synthesis]),
         others=lambda wildcards: [

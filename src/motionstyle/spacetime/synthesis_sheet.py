@@ -200,6 +200,10 @@ def _row(cells: Cells, folder: Path) -> SynthesisRow:
         row=cells.row,
         folder=folder,
     )
+    if row.id.endswith("_copied"):
+        cells.problem(
+            "id", f"{row.id!r} ends in '_copied', which names the baseline of another row"
+        )
     if row.last_frame is not None and row.last_frame - (row.first_frame or 0) < 7:
         cells.problem("last_frame", "a window needs at least 8 frames, from first_frame on")
     return row
