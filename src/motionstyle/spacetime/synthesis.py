@@ -14,11 +14,11 @@ from motionstyle.dynamics.codegen import FrameFunction
 from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
+from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.edits import edit_shoes
 from motionstyle.spacetime.foot_constraints import FootConstraints
-from motionstyle.spacetime.interior_point import InteriorPoint, InteriorPointResult, SolverSettings
+from motionstyle.spacetime.solver_point import InteriorPointResult, SolverSettings
 from motionstyle.spacetime.spacetime_problem import (
-    Evaluator,
     SpacetimeProblem,
     SpacetimeSettings,
     Values,
@@ -118,10 +118,8 @@ def synthesise(
         functions=dict(functions),
         settings=weights or SpacetimeSettings(),
     )
-    evaluator = Evaluator(problem)
-    solver = InteriorPoint(evaluator, settings or SolverSettings())
-    controls = evaluator.basis.fit((start or plan.start).coordinates)
-    result = solver.solve(solver.start(controls), log)
+    controls = problem.basis().fit((start or plan.start).coordinates)
+    result = solve_spacetime(problem, controls, settings=settings, log=log)
     values = result.values
     motion = replace(
         plan.start,
