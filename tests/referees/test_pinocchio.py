@@ -72,7 +72,7 @@ def to_pinocchio(q, qd, qdd):
 
 
 def test_forces_equal_pinocchio(plain_body):
-    functions = load_functions(dynamics_functions(), None)
+    functions = load_functions(dynamics_functions, None)
     model, _ = model_of(plain_body)
     model.gravity = pin.Motion(np.array([0, -9.81, 0]), np.zeros(3))
     data = model.createData()
@@ -89,7 +89,7 @@ def test_forces_equal_pinocchio(plain_body):
 
 
 def test_contact_forces_equal_pinocchio(plain_body):
-    functions = load_functions(dynamics_functions(), None)
+    functions = load_functions(dynamics_functions, None)
     model, last = model_of(plain_body)
     model.gravity = pin.Motion(np.array([0, -9.81, 0]), np.zeros(3))
     data = model.createData()

@@ -16,7 +16,7 @@ from motionstyle.spacetime.physical import PhysicalSettings, fit_physical
 
 @pytest.fixture(scope="module")
 def functions():
-    return load_functions(dynamics_functions(), None)
+    return load_functions(dynamics_functions, None)
 
 
 def silent(_text):

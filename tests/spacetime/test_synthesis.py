@@ -30,9 +30,7 @@ def row_of(**edits):
 
 @pytest.fixture(scope="module")
 def functions():
-    return load_functions(dynamics_functions(), None) | load_functions(
-        second_order_functions(), None
-    )
+    return load_functions(dynamics_functions, None) | load_functions(second_order_functions, None)
 
 
 @pytest.fixture(scope="module")

@@ -71,6 +71,8 @@ except MotionStyleError as error:
 
 # The first synthesis of each task, for figures.
 ONE_OF_EACH_TASK = list({row.task: row.id for row in reversed(SYNTHESES.values())}.values())[::-1]
+# Syntheses on which solver designs are held against each other.
+COMPARED = [id for id in CONFIG["solver_comparison"]["problems"] if id in SYNTHESES]
 # Syntheses on a ramp, each with the one on the level in the same style and window.
 RAMPS = [
     (ramp.id, level.id)
@@ -205,7 +207,7 @@ TABLES = [
     RESULTS / f"tables/{name}.csv"
     for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
 ]
-TABLES += [RESULTS / f"tables/{name}.csv" for name in ("syntheses", "ramp_gait")]
+TABLES += [RESULTS / f"tables/{name}.csv" for name in ("syntheses", "ramp_gait", "solver_comparison")]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {
@@ -216,6 +218,7 @@ FIGURES = ["body", "strips", "gait", "markers"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates"] if PLATES else []
 FIGURES += ["syntheses", "warps"] if SYNTHESES else []
+FIGURES += ["solvers"] if COMPARED else []
 
 
 def everything():

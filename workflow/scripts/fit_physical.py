@@ -15,7 +15,7 @@ with job(snakemake.log[0]):
     id = snakemake.wildcards.clip
     try:
         motion = prepare(load_motion(snakemake.input.motion), physical)
-        functions = load_functions(dynamics_functions(), Path(snakemake.input.code))
+        functions = load_functions(dynamics_functions, Path(snakemake.input.code))
         found = fit_physical(motion, functions, settings_from(physical))
     except MotionStyleError as error:
         print(f"failed: {error}")

@@ -10,6 +10,6 @@ from motionstyle.spacetime.style import save_style
 from motionstyle.spacetime.synthesis import initial_style_of
 
 with job(snakemake.log[0]):
-    functions = load_functions(dynamics_functions(), Path(snakemake.input.code))
+    functions = load_functions(dynamics_functions, Path(snakemake.input.code))
     style = initial_style_of(load_motion(snakemake.input.motion), functions)
     save_style(Path(snakemake.output.style), style)

@@ -13,7 +13,7 @@ from motionstyle.tables import write_table
 
 with job(snakemake.log[0]):
     params = snakemake.params
-    functions = load_functions(dynamics_functions(), Path(snakemake.input.code))
+    functions = load_functions(dynamics_functions, Path(snakemake.input.code))
     sheet = {row.id: row for row in read_syntheses(params.sheet)}
     rows = []
     for number, (ramp, level) in enumerate(params.pairs):

@@ -20,8 +20,8 @@ with job(snakemake.log[0]):
     try:
         example = example_window(load_motion(inputs.example), row)
         plan = load_plan(row, example, inputs.table, inputs.status)
-        functions = load_functions(dynamics_functions(), Path(inputs.code))
-        functions |= load_functions(second_order_functions(), Path(inputs.second_order))
+        functions = load_functions(dynamics_functions, Path(inputs.code))
+        functions |= load_functions(second_order_functions, Path(inputs.second_order))
         found = synthesise(row, plan, load_style(Path(inputs.style)), functions)
     except MotionStyleError as error:
         print(f"failed: {error}")

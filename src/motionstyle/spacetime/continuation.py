@@ -71,7 +71,7 @@ def solve_spacetime(
             for k, t in enumerate(result.trace)
         ]
         seconds += result.seconds
-        if result.status == "not a number":
+        if result.status == "not a number" or seconds >= settings.seconds:
             break
         controls, coefficients = result.point.controls, result.point.coefficients * FORCE_UNIT
         barrier = WARM_BARRIER

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from motionstyle.dynamics.inverse import foot_points, inverse_forces
 from motionstyle.dynamics.symbols import BodyParameters
-from motionstyle.spacetime.solver_point import FORCE_UNIT
+from motionstyle.spacetime.interior_point import InteriorPoint
+from motionstyle.spacetime.solver_point import FORCE_UNIT, SolverSettings
 from motionstyle.spacetime.spacetime_problem import COUNT, HEELS, POINTS, Evaluator
 
 Array = NDArray[np.float64]
@@ -188,10 +189,13 @@ class IpoptReferee:
         values = ca.vertcat(nz, lam_f * ca.DM(np.tile(own, self.frames)))
         return _sparse(rows, columns, values, self.size, self.size)
 
-    def solve(self, controls: Array, coefficients: Array, verbose: bool = False) -> RefereeResult:
-        """Return IPOPT's optimum from control points (K, 35) and λ in N (F, 32)."""
+    def solve(self, controls: Array, coefficients: Array | None = None) -> RefereeResult:
+        """Return IPOPT's optimum from control points (K, 35) and, if known, λ in N (F, 32)."""
         began = perf_counter()
         evaluator, frames = self.evaluator, self.frames
+        if coefficients is None:
+            start = InteriorPoint(evaluator, SolverSettings()).start(controls)
+            coefficients = start.coefficients * FORCE_UNIT
         values = evaluator.values(controls, coefficients)
         state = np.concatenate(
             [values.coordinates, values.rates / UNIT[COUNT], values.accelerations / UNIT[-1]],

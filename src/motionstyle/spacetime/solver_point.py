@@ -20,14 +20,15 @@ class SolverSettings:
     Attributes
     ----------
     tolerance : of the scaled optimality error, Wächter & Biegler eq. (5).
-    iterations, seconds : after which the solver gives up, and says so.
+    iterations : after which the solver gives up, and says so. seconds : the same for emergencies,
+        since what it cuts depends on the machine.
     barrier : first μ. It is lowered to min(barrier_shrink·μ, μ^barrier_power) whenever the error
         of the barrier problem is below barrier_gate·μ.
     """
 
     tolerance: float = 1e-6
-    iterations: int = 300
-    seconds: float = 120.0
+    iterations: int = 400
+    seconds: float = 900.0
     barrier: float = 1e-1
     barrier_shrink: float = 0.2
     barrier_power: float = 1.5
@@ -131,3 +132,8 @@ class InteriorPointResult:
     iterations: int
     seconds: float
     trace: list[Trace] = field(default_factory=list)
+
+    @property
+    def coefficients(self) -> Array:
+        """λ in N, (F, 32)."""
+        return self.point.coefficients * FORCE_UNIT

@@ -88,6 +88,26 @@ def initial_style_of(
     return replace(style, about={**about, "body_mass_kg": motion.body.mass})
 
 
+def spacetime_problem(
+    row: SynthesisRow,
+    plan: Plan,
+    style: Style,
+    functions: Mapping[str, FrameFunction],
+    weights: SpacetimeSettings | None = None,
+) -> SpacetimeProblem:
+    """Return the problem of a row: its plan, and its style with the row's shoes."""
+    shoes = edit_shoes(style.shoe_stiffness, style.shoe_rest_length, row.edits)
+    return SpacetimeProblem(
+        body=plan.body,
+        rate_hz=plan.start.rate_hz,
+        feet=plan.feet,
+        ranges=plan.ranges,
+        style=replace(style, shoe_stiffness=shoes[0], shoe_rest_length=shoes[1]),
+        functions=dict(functions),
+        settings=weights or SpacetimeSettings(),
+    )
+
+
 def synthesise(
     row: SynthesisRow,
     plan: Plan,
@@ -108,16 +128,7 @@ def synthesise(
     Whether it converged stands in the report's `status`: a motion that did not is returned for a
     look, not for use.
     """
-    shoes = edit_shoes(style.shoe_stiffness, style.shoe_rest_length, row.edits)
-    problem = SpacetimeProblem(
-        body=plan.body,
-        rate_hz=plan.start.rate_hz,
-        feet=plan.feet,
-        ranges=plan.ranges,
-        style=replace(style, shoe_stiffness=shoes[0], shoe_rest_length=shoes[1]),
-        functions=dict(functions),
-        settings=weights or SpacetimeSettings(),
-    )
+    problem = spacetime_problem(row, plan, style, functions, weights)
     controls = problem.basis().fit((start or plan.start).coordinates)
     result = solve_spacetime(problem, controls, settings=settings, log=log)
     values = result.values
