@@ -139,4 +139,4 @@ def plain_motion(plain_body: Body, standing: np.ndarray) -> Motion:
 @pytest.fixture(scope="session")
 def all_functions() -> dict[str, FrameFunction]:
     """The dynamics' functions, first and second order, on CasADi's virtual machine."""
-    return load_functions([*dynamics_functions(), *second_order_functions()], None)
+    return load_functions(dynamics_functions, None) | load_functions(second_order_functions, None)
