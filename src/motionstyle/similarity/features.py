@@ -132,11 +132,11 @@ def whole_body_vector(motion: Motion, segment: Segment) -> Array:
 
 
 def support_height(motion: Motion, segment: Segment) -> float:
-    """Return the height (m) of the lowest surface that bears in a segment, 0 on a level floor."""
+    """Return the mean height (m) of what bears in a segment, 0 on a level floor."""
     heights = motion.provenance.get("support_height_m")
     if heights is None:
         return 0.0
-    return float(min(heights[segment.first : segment.last + 1]))
+    return float(np.mean(heights[segment.first : segment.last + 1]))
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ class StyleModel:
     name : the set.
     scaling : of the features, from the training patterns.
     patterns : standardised training patterns, (I, n).
-    gamma : Γ of the kernel, on standardised features.
+    gamma, svm_gamma : Γ of kernel PCA and of the SVM, on standardised features.
     alphas, rho : of the SVM, (I,); Σ α = 1.
     axes : β, coefficients of the leading unit axes of kernel PCA, (I, O_c).
     column_means, grand_mean : of the Gram matrix, to centre new patterns.
@@ -52,29 +52,37 @@ class StyleModel:
     scaling: Scaling
     patterns: Array
     gamma: float
+    svm_gamma: float
     alphas: Array
     rho: float
     axes: Array
     column_means: Array
     grand_mean: float
 
-    def kernel(self, patterns: Array) -> Array:
+    def kernel(self, patterns: Array, gamma: float) -> Array:
         """Return k between patterns (J, n) in raw features and the training ones, (J, I)."""
         scaled = self.scaling.apply(np.atleast_2d(patterns))
-        return np.exp(-self.gamma * cdist(scaled, self.patterns, "sqeuclidean"))
+        return np.exp(-gamma * cdist(scaled, self.patterns, "sqeuclidean"))
 
     def svm_scores(self, patterns: Array) -> Array:
         """Return f_s of patterns (J, n), (J,); at least 0 inside."""
-        return self.kernel(patterns) @ self.alphas - self.rho
+        return self.kernel(patterns, self.svm_gamma) @ self.alphas - self.rho
 
     def leakages(self, patterns: Array) -> tuple[Array, Array]:
         """Return leak(p) and the relative leakage of patterns (J, n), both (J,)."""
-        kernel = self.kernel(patterns)
-        means = kernel.mean(axis=1)
-        norms = 1.0 - 2 * means + self.grand_mean
-        centred = kernel - means[:, None] - self.column_means + self.grand_mean
-        leak = np.maximum(norms - ((centred @ self.axes) ** 2).sum(axis=1), 0.0)
-        return leak, np.clip(leak / np.maximum(norms, 1e-300), 0.0, 1.0)
+        kernel = self.kernel(patterns, self.gamma)
+        return kernel_leakages(kernel, self.axes, self.column_means, self.grand_mean)
+
+
+def kernel_leakages(
+    kernel: Array, axes: Array, column_means: Array, grand_mean: float
+) -> tuple[Array, Array]:
+    """Return leak(p) and the relative leakage (J,) from the kernel (J, I) with k(p, p) = 1."""
+    means = kernel.mean(axis=1)
+    norms = 1.0 - 2 * means + grand_mean
+    centred = kernel - means[:, None] - column_means + grand_mean
+    leak = np.maximum(norms - ((centred @ axes) ** 2).sum(axis=1), 0.0)
+    return leak, np.clip(leak / np.maximum(norms, 1e-300), 0.0, 1.0)
 
 
 def fit_scaling(patterns: Array, name: str, standardise: bool = True) -> Scaling:
@@ -111,17 +119,17 @@ def fit_model(
     *,
     relative_width: float,
     cutoff: int,
+    svm_width: float | None = None,
     nu: float | None = None,
-    gamma: float | None = None,
 ) -> StyleModel:
     """Return both models of training patterns (I, n) in raw features.
 
     Parameters
     ----------
-    relative_width : Γ times the median squared distance of the standardised patterns.
+    relative_width : Γ of kernel PCA times the median squared distance of standardised patterns.
+    svm_width : the same of the SVM; None for that of kernel PCA.
     cutoff : O_c; at most I − 1 axes are there.
     nu : of the SVM; None for the hard margin, ν = 1/I, which keeps every training pattern inside.
-    gamma : Γ itself, instead of the relative width.
 
     Raises
     ------
@@ -142,9 +150,13 @@ def fit_model(
         )
     scaling = fit_scaling(patterns, name)
     scaled = scaling.apply(patterns)
-    if gamma is None:
-        gamma = relative_width / median_squared_distance(scaled)
-    gram = np.exp(-gamma * cdist(scaled, scaled, "sqeuclidean"))
+    distances = cdist(scaled, scaled, "sqeuclidean")
+    unit = median_squared_distance(scaled)
+    if unit <= 0:
+        raise MotionStyleError(f"set {name}: most patterns are copies of one another")
+    gamma = relative_width / unit
+    svm_gamma = gamma if svm_width is None else svm_width / unit
+    gram = np.exp(-svm_gamma * distances)
     svm = OneClassSVM(kernel="precomputed", nu=1 / count if nu is None else nu, tol=1e-9)
     svm.fit(gram)
     total = svm.dual_coef_.sum()
@@ -153,26 +165,34 @@ def fit_model(
     scores = gram @ alphas
     # with a hard margin ρ is the least score; LIBSVM finds it within its tolerance
     rho = float(scores.min()) if nu is None else float(svm.offset_[0] / total)
-    axes, columns, grand = _kernel_axes(gram, cutoff, name)
-    return StyleModel(name, scaling, scaled, gamma, alphas, rho, axes, columns, grand)
+    axes, columns, grand = kernel_axes(np.exp(-gamma * distances), cutoff, name)
+    return StyleModel(
+        name, scaling, scaled, gamma, svm_gamma, alphas, rho, axes, columns, grand
+    )
 
 
-def _kernel_axes(gram: Array, cutoff: int, name: str) -> tuple[Array, Array, float]:
+def kernel_axes(gram: Array, cutoff: int, name: str) -> tuple[Array, Array, float]:
     """Return β of the leading axes, (I, O_c), and the Gram matrix' column and grand means.
 
     Eigenvalues below the rounding of the largest belong to copies of patterns and are no axes.
     """
     columns, grand = gram.mean(axis=0), float(gram.mean())
     centred = gram - columns - columns[:, None] + grand
-    values, vectors = eigh(centred)
-    if values[0] < -1e-8 * max(values[-1], 1e-12):
+    count = len(gram)
+    values, vectors = eigh(centred, subset_by_index=(max(0, count - cutoff), count - 1))
+    # eigenvalues that are left out and at least 0 have a sum of squares of at most their sum's
+    # square; more betrays a negative one without computing them all
+    rest = np.trace(centred) - values.sum()
+    spread = np.square(centred).sum() - np.square(values).sum()
+    if min(rest, values[0]) < -1e-8 * count or spread > (max(rest, 0) + 1e-6 * count) ** 2:
+        least = float(eigh(centred, eigvals_only=True, subset_by_index=(0, 0))[0])
         raise MotionStyleError(
-            f"set {name}: the kernel matrix is not positive semidefinite (eigenvalue "
-            f"{values[0]:.2g} beside {values[-1]:.2g}), so it has no principal axes"
+            f"set {name}: the kernel matrix is not positive semidefinite (eigenvalue {least:.2g}, "
+            f"largest {values[-1]:.2g}), so it has no principal axes"
         )
     if values[-1] <= 1e-12:
         raise MotionStyleError(f"set {name}: all patterns are equal, so there is nothing to learn")
-    kept = np.flatnonzero(values > 1e-10 * values[-1])[::-1][:cutoff]
+    kept = np.flatnonzero(values > 1e-10 * values[-1])[::-1]
     values, vectors = values[kept], vectors[:, kept]
     signs = np.sign(vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])])
     return vectors * signs / np.sqrt(values), columns, grand
