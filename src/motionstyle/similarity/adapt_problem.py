@@ -16,7 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, csc_matrix
+from scipy.sparse import coo_matrix, csc_matrix, vstack
 
 from motionstyle.body.layout import COORDINATES, NODES
 from motionstyle.body.ranges import joint_ranges
@@ -31,6 +31,7 @@ from motionstyle.similarity.features import (
     from_samples,
     leg_vector,
     posture_frames,
+    to_samples,
     whole_body_vector,
 )
 from motionstyle.similarity.footholds import Example, Footholds
@@ -45,6 +46,7 @@ FIXED = np.setdiff1d(np.arange(len(COORDINATES)), MOVED)
 WIDTH = len(MOVED)
 _COLUMN = {"l": 6, "r": 6 + LEG_DOF}
 CLEARANCE_M = 0.002
+TORQUE_INFLATION = 3.0
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,7 @@ def torque_block(example: Example, holds: Footholds, settings: Mapping[str, Any]
     index = np.arange(frames * WIDTH).reshape(frames, WIDTH)
     index = np.hstack([index[:-2], index[1:-1], index[2:]])
     empty = np.zeros((frames - 2, 0))
-    return Block("torque", function, index, parameters, empty, empty)
+    return Block("torque", function, index, parameters, empty, empty, inflation=TORQUE_INFLATION)
 
 
 def model_expressions(model: StyleModel, features: ca.MX) -> tuple[ca.MX, ca.MX]:
@@ -374,7 +376,9 @@ def build_problem(
     whole = [s for s in example.segments if s.set == "whole_body"]
     scores = [f"whole_body {k}" for k in range(len(whole))] if models else []
     scores += [f"{pieces[k].segment.set} {k}" for k in judged] if models else []
-    count = int(starts[-1]) + len(scores)
+    # the features of judged leg segments as their frames show them, one set of variables each
+    shown = int(starts[-1]) + features * np.arange(len(judged) + 1 if models else 1)
+    count = int(shown[-1]) + len(scores)
     blocks = [
         frame_block(example, holds, settings, marked),
         smooth_block(example, holds, settings),
@@ -385,7 +389,7 @@ def build_problem(
         for p, size in zip(pieces, sizes, strict=True)
     ]
     blocks.append(_component_block(starts, components_start, settings))
-    slack = int(starts[-1]) + np.arange(len(scores))
+    slack = int(shown[-1]) + np.arange(len(scores))
     if models:
         blocks.append(
             whole_body_style_block(
@@ -393,22 +397,30 @@ def build_problem(
             )
         )
         for name in SIDE_OF_SET:
-            own = [
-                (k, slack[len(whole) + n])
-                for n, k in enumerate(judged)
-                if pieces[k].segment.set == name
-            ]
+            own = [n for n, k in enumerate(judged) if pieces[k].segment.set == name]
             if not own:
                 continue
-            index = np.array([[*range(starts[k], starts[k] + features), s] for k, s in own])
-            halves = np.array([components_start[k][:features] for k, _ in own])
+            index = np.array(
+                [[*range(shown[n], shown[n + 1]), slack[len(whole) + n]] for n in own]
+            )
+            halves = np.array([components_start[judged[n]][:features] for n in own])
             blocks.append(leg_style_block(name, models[name], index, halves, settings))
-    linear, value = _subspace_equations(pieces, sizes, starts, spaces, count)
+    equations = _subspace_equations(pieces, sizes, starts, spaces, count)
+    if models:
+        seen = [pieces[k].segment for k in judged]
+        more = _feature_equations(seen, shown, spaces, features, count)
+        equations = (vstack([equations[0], more[0]], format="csc"), np.append(*[e[1] for e in (equations, more)]))
+    linear, value = equations
     price = np.zeros(count)
     price[slack] = settings["slack_price"]
     program = assemble(count, blocks, linear, value, price)
     begin = np.concatenate(
-        [initial_frames(example, holds).ravel(), *components_start, np.zeros(len(scores))]
+        [
+            initial_frames(example, holds).ravel(),
+            *components_start,
+            *([components_start[k][:features] for k in judged] if models else []),
+            np.zeros(len(scores)),
+        ]
     )
     lower, upper = _bounds(example, count, slack, settings)
     return AdaptProblem(program, begin, lower, upper, tuple(pieces), tuple(scores), frames)
@@ -454,6 +466,37 @@ def _subspace_equations(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (number, count)
     )
     return matrix.tocsc(), np.concatenate(right)
+
+
+def _feature_equations(
+    segments: Sequence[Segment],
+    shown: NDArray[np.int64],
+    spaces: Mapping[str, LegSpace],
+    features: int,
+    count: int,
+) -> tuple[csc_matrix, Array]:
+    """Return A, b of A x = b: a leg segment's features are those of its own frames, resampled."""
+    rows, columns, values, right = [], [], [], []
+    for number, segment in enumerate(segments):
+        space, frames = spaces[segment.set], np.arange(segment.first, segment.last + 1)
+        column = _COLUMN[SIDE_OF_SET[segment.set]]
+        sampling = to_samples(len(frames))
+        axes = (space.axes[:, :features] / space.deviations[:features]).reshape(
+            LEG_DOF, SAMPLES, features
+        )
+        own = features * number + np.arange(features)
+        rows.append(own)
+        columns.append(shown[number] + np.arange(features))
+        values.append(np.ones(features))
+        for joint in range(LEG_DOF):
+            matrix = axes[joint].T @ sampling
+            rows.append(np.repeat(own, len(frames)))
+            columns.append(np.tile(frames * WIDTH + column + joint, features))
+            values.append(-matrix.ravel())
+        right.append(-(space.mean @ space.axes[:, :features]) / space.deviations[:features])
+    shape = (features * len(segments), count)
+    triplet = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return coo_matrix(triplet, shape).tocsc(), np.concatenate(right)
 
 
 def _bounds(

@@ -35,6 +35,8 @@ class Block:
     lower, upper : bounds of c, (N, len c).
     hessian : (z, p, multipliers of c, factor) → the Hessian of factor · ½‖r‖² + λᵀc, dense; or
         None for Gauss–Newton's.
+    inflation : factor on Gauss–Newton's, above 1 where a term is so curved that full steps would
+        swing to and fro.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Block:
     lower: Array
     upper: Array
     hessian: ca.Function | None = None
+    inflation: float = 1.0
 
 
 def block_function(
@@ -105,7 +108,7 @@ def assemble(
         products = _products(residuals, size).map(number)
         grad, hess = products(r, jr)
         gradient.append(_scatter(ca.vec(grad), block.index.ravel(), count))
-        hessian = lam_f * ca.vec(hess)
+        hessian = lam_f * block.inflation * ca.vec(hess)
         if block.hessian is not None:
             factor = ca.repmat(lam_f, 1, number)
             parameters = ca.DM(block.parameters.T)

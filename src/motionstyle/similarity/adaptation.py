@@ -1,0 +1,331 @@
+"""Adapting one example to a task, with and without the style terms, and measuring the result.
+
+Paper §4.2, §6; specification §7. The measures are the columns of `tables/adaptations.csv`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from motionstyle.body.kinematics import contact_points, forward_kinematics
+from motionstyle.errors import MotionStyleError
+from motionstyle.mocap.floor import runs
+from motionstyle.motion.motion import Motion
+from motionstyle.similarity.adapt_problem import MOVED, WIDTH, build_problem
+from motionstyle.similarity.alignment import SETS, SIDE_OF_SET
+from motionstyle.similarity.bank import Bank
+from motionstyle.similarity.features import (
+    LEG_COORDINATES,
+    LEG_DOF,
+    SAMPLES,
+    leg_vector,
+    pair_vector,
+    whole_body_vector,
+)
+from motionstyle.similarity.footholds import Example, Footholds, cut_example, make_footholds
+from motionstyle.similarity.leg_space import LegSpace
+from motionstyle.similarity.models import StyleModel
+from motionstyle.similarity.patterns import paper_set
+from motionstyle.similarity.settings import event_rules
+from motionstyle.similarity.solver import Solution, solve
+from motionstyle.similarity.study import mismatched_of
+from motionstyle.similarity.tasks import Task
+from motionstyle.similarity.validation import final_model
+
+Array = NDArray[np.float64]
+VARIANTS = ("full", "without_style")
+LARGEST_ERROR_CM = 1.0
+SCORE_TOLERANCE = 1e-6
+BALANCE_FRAMES = 5
+ADAPTATION_COLUMNS = (
+    *("task", "action", "example", "variant", "figure", "solved", "status", "reason"),
+    *("contact_error_cm", "contact_rms_cm", "penetration_cm", "skate_cm", "min_svm_score"),
+    *("min_svm_score_example", "score_slack", "relative_leakage", "relative_leakage_example"),
+    *("whole_body_leakage", "left_leg_leakage", "right_leg_leakage", "pose_outlier"),
+    *("speed_ratio", "leakage_ratio", "distorted", "components", "settings_id"),
+    *("balance_marked", "whole_body_segments", "leg_segments", "training_patterns", "frames"),
+    *("variables", "iterations", "seconds", "config"),
+)
+
+
+@dataclass(frozen=True)
+class StyleModels:
+    """The three models and leg subspaces that a task may use, with the number of patterns."""
+
+    models: Mapping[str, StyleModel]
+    spaces: Mapping[str, LegSpace]
+    patterns: int
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """The motion a variant ended with, or None where the solver failed, and its table row."""
+
+    motion: Motion | None
+    row: dict[str, object]
+
+
+def models_without(bank: Bank, settings: Mapping[str, Any], clips: set[str]) -> StyleModels:
+    """Return models and subspaces that have not seen these clips nor their mirrored copies."""
+    patterns, spaces, _ = paper_set(bank, settings, without=clips)
+    models = {}
+    for name in SETS:
+        outside = mismatched_of(bank, spaces, patterns[name], settings)
+        models[name], _ = final_model(patterns[name], outside, settings)
+    return StyleModels(models, spaces, sum(len(p) for p in patterns.values()))
+
+
+def settings_id(settings: Mapping[str, Any]) -> str:
+    """Return a short digest of the adaptation's settings, the same for all tasks of a run.
+
+    The number of components by action is one setting, as in the paper.
+    """
+    return sha256(repr(sorted(settings["adaptation"].items())).encode()).hexdigest()[:8]
+
+
+def adapt(
+    motion: Motion, task: Task, bank: Bank, settings: Mapping[str, Any], config: str
+) -> dict[str, Adapted]:
+    """Return the full and the ablated adaptation of an example, and the row of the example itself.
+
+    Raises
+    ------
+    MotionStyleError
+        If the example lacks segments, a foothold is out of reach, or too few pairs are left
+        without the example.
+    """
+    part = settings["adaptation"]
+    style = models_without(bank, settings, {motion.id.removesuffix("_mirror")})
+    example = cut_example(motion, task, event_rules(settings), part["rate_hz"])
+    holds = make_footholds(example, task)
+    marked = np.zeros(example.motion.frames, dtype=bool)
+    if task.balance:
+        marked[-BALANCE_FRAMES:] = True
+    components = part["components"][task.action]
+    common: dict[str, object] = {
+        "task": task.task,
+        "action": task.action,
+        "example": task.example,
+        "figure": task.figure or None,
+        "components": components,
+        "settings_id": settings_id(settings),
+        "balance_marked": task.balance,
+        "whole_body_segments": sum(s.set == "whole_body" for s in example.segments),
+        "leg_segments": sum(s.set in SIDE_OF_SET for s in example.segments),
+        "training_patterns": style.patterns,
+        "frames": example.motion.frames,
+        "config": config,
+    }
+    own = measure(example.motion, example, holds, style, bank, settings)
+    found = {"example": Adapted(None, common | own | {"variant": "example", "status": "not run"})}
+    for variant in VARIANTS:
+        problem = build_problem(
+            example,
+            holds,
+            style.spaces,
+            style.models if variant == "full" else None,
+            part,
+            components,
+            settings["leg_space"]["features"],
+            marked,
+        )
+        solution = solve(
+            problem.program,
+            problem.start,
+            problem.lower,
+            problem.upper,
+            max_iterations=part["max_iterations"],
+            time_limit_s=part["time_limit_s"],
+        )
+        row = common | {"variant": variant, "variables": len(problem.start)}
+        slack = solution.x[len(solution.x) - len(problem.scores) :] if problem.scores else None
+        found[variant] = _finish(
+            solution, slack, example, holds, task, variant, style, bank, settings, row, own
+        )
+    return found
+
+
+def _finish(
+    solution: Solution,
+    slack: Array | None,
+    example: Example,
+    holds: Footholds,
+    task: Task,
+    variant: str,
+    style: StyleModels,
+    bank: Bank,
+    settings: Mapping[str, Any],
+    row: dict[str, object],
+    own: Mapping[str, object],
+) -> Adapted:
+    """Return the motion and row of a solved program, or the row of a failure with its diagnosis."""
+    row |= {
+        "status": solution.status,
+        "iterations": solution.iterations,
+        "seconds": solution.seconds,
+        "score_slack": None if slack is None else float(np.max(slack, initial=0.0)),
+        "min_svm_score_example": own["min_svm_score"],
+        "relative_leakage_example": own["relative_leakage"],
+    }
+    if not solution.solved:
+        return Adapted(None, row | {"solved": False, "reason": solution.diagnosis})
+    motion = _motion(solution.x, example, holds, task, variant, solution.status)
+    row |= measure(motion, example, holds, style, bank, settings)
+    row["leakage_ratio"] = row["relative_leakage"] / max(own["relative_leakage"], 1e-9)
+    row["pose_outlier"] = row["pose_outlier"] / max(own["pose_outlier"], 1e-9)
+    limits = settings["adaptation"]["distorted"]
+    row["distorted"] = any(row[name] > limit for name, limit in limits.items())
+    failures = [
+        f"{name} {row[name]:.2f} cm"
+        for name in ("contact_error_cm", "penetration_cm", "skate_cm")
+        if row[name] > LARGEST_ERROR_CM
+    ]
+    if variant == "full" and row["min_svm_score"] < -SCORE_TOLERANCE:
+        failures.append(
+            f"S >= 0 cannot be met: least score {row['min_svm_score']:.2g}"
+            + (
+                ", also (example, example) lies outside"
+                if own["min_svm_score"] < -SCORE_TOLERANCE
+                else ""
+            )
+        )
+    row |= {"solved": not failures, "reason": "; ".join(failures) or None}
+    return Adapted(motion, row)
+
+
+def _motion(
+    x: Array, example: Example, holds: Footholds, task: Task, variant: str, status: str
+) -> Motion:
+    """Return the adapted motion from the program's variables."""
+    source = example.motion
+    coordinates = source.coordinates.copy()
+    coordinates[:, MOVED] = x[: source.frames * WIDTH].reshape(source.frames, WIDTH)
+    normals = np.zeros_like(source.contact_normals)
+    normals[..., 1] = 1.0
+    known = source.provenance
+    surface = holds.surface
+    provenance = {
+        name: known.get(name) for name in ("dataset", "subject", "action", "style", "source")
+    } | {
+        "example": task.example,
+        "edit": f"{task.task}, {variant.replace('_', ' ')}",
+        "footprints": task.task,
+        "planted": bool(known.get("planted")),
+        "solver_status": status,
+        "support_height_m": [float(h) for h in holds.support],
+        "surface": {
+            "places_m": list(surface.places),
+            "rises_m": list(surface.rises),
+            "origin_m": list(surface.origin),
+            "direction": list(surface.direction),
+        },
+    }
+    name = task.task if variant == "full" else f"{task.task}_{variant}"
+    return replace(
+        source,
+        id=name,
+        kind="adapted",
+        coordinates=coordinates,
+        contact_normals=normals,
+        contact_forces=None,
+        provenance=provenance,
+    )
+
+
+def measure(
+    motion: Motion,
+    example: Example,
+    holds: Footholds,
+    style: StyleModels,
+    bank: Bank,
+    settings: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return contact error, penetration, skate, scores, leakage, pose outlier and speed ratio."""
+    points = contact_points(motion.body, forward_kinematics(motion.body, motion.coordinates))
+    misses = np.linalg.norm(points - holds.targets, axis=-1)[holds.bearing]
+    sunk = np.maximum(holds.surface.heights(points) - points[..., 1], 0.0)
+    skates = [0.0]
+    for p in range(points.shape[1]):
+        for first, last in runs(holds.bearing[:, p]):
+            own = points[first : last + 1, p][:, [0, 2]]
+            skates.append(float(np.linalg.norm(own - own.mean(axis=0), axis=1).max()))
+    scores, leaks = pair_scores(motion, example, style, settings["leg_space"]["features"])
+    legs = MOVED[6:]
+    speed = np.abs(np.diff(motion.coordinates[:, legs], axis=0)).max()
+    usual = np.abs(np.diff(example.motion.coordinates[:, legs], axis=0)).max()
+    every = np.concatenate(list(leaks.values()))
+    return {
+        "contact_error_cm": 100 * misses.max(initial=0.0),
+        "contact_rms_cm": 100 * float(np.sqrt(np.mean(misses**2))) if len(misses) else 0.0,
+        "penetration_cm": 100 * sunk.max(),
+        "skate_cm": 100 * max(skates),
+        "min_svm_score": float(min(s.min() for s in scores.values() if len(s))),
+        "relative_leakage": float(every.mean()),
+        **{f"{n}_leakage": float(v.mean()) if len(v) else None for n, v in leaks.items()},
+        "pose_outlier": pose_outlier(motion, bank, {motion.id, example.motion.id}),
+        "speed_ratio": float(speed / max(usual, 1e-9)),
+    }
+
+
+def pair_scores(
+    motion: Motion, example: Example, style: StyleModels, features: int
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return f_s and relative leakage of each pair (new segment, example's segment), by set."""
+    scores, leaks = {}, {}
+    for name in SETS:
+        own = [s for s in example.segments if s.set == name]
+        if not own:
+            scores[name] = leaks[name] = np.zeros(0)
+            continue
+        pairs = []
+        for segment in own:
+            if name == "whole_body":
+                halves = [whole_body_vector(m, segment) for m in (motion, example.motion)]
+            else:
+                halves = [
+                    style.spaces[name].standardise(leg_vector(m, segment), features)
+                    for m in (motion, example.motion)
+                ]
+            pairs.append(pair_vector(*halves))
+        model = style.models[name]
+        scores[name] = model.svm_scores(np.array(pairs))
+        leaks[name] = model.leakages(np.array(pairs))[1]
+    return scores, leaks
+
+
+def pose_outlier(motion: Motion, bank: Bank, without: set[str]) -> float:
+    """Return the largest distance of a leg's pose from the nearest captured one of this action.
+
+    Joint angles are counted in standard deviations of the captured poses.
+
+    Raises
+    ------
+    MotionStyleError
+        If the bank holds no pose of this action.
+    """
+    largest = 0.0
+    action = motion.provenance.get("action")
+    excluded = without | {str(motion.provenance.get("example"))}
+    for name, side in SIDE_OF_SET.items():
+        kept = [
+            k
+            for k, owner in enumerate(bank.owners[name])
+            if bank.clips[owner].action == action and bank.clips[owner].base not in excluded
+        ]
+        if not kept:
+            raise MotionStyleError(f"motion {motion.id}: no captured pose of action {action}")
+        poses = bank.vectors[name][kept].reshape(-1, LEG_DOF, SAMPLES)
+        poses = poses.transpose(0, 2, 1).reshape(-1, LEG_DOF)
+        spread = np.maximum(poses.std(axis=0), np.radians(0.5))
+        distances, _ = cKDTree(poses / spread).query(
+            motion.coordinates[:, LEG_COORDINATES[side]] / spread
+        )
+        largest = max(largest, float(distances.max()))
+    return largest
