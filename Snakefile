@@ -12,6 +12,7 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/mocap.smk"
 include: "workflow/rules/physics.smk"
 include: "workflow/rules/moments.smk"
+include: "workflow/rules/similarity.smk"
 include: "workflow/rules/evaluation.smk"
 include: "workflow/rules/report.smk"
 

@@ -15,12 +15,14 @@ from motionstyle.mocap.datasets.doors import read_datasets
 from motionstyle.mocap.planted.variants import read_planted
 from motionstyle.mocap.datasets.sheet import EMBEDDED, MARKER_FILES, read_sheet
 from motionstyle.mocap.datasets.wheel import read_wheel_pin
+from motionstyle.similarity.settings import read_settings
+from motionstyle.similarity.tasks import read_tasks
 
 ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
 PATH_KEYS = (
     *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
-    *("planted", "normative"),
+    *("planted", "normative", "similarity", "adaptations"),
 )
 
 
@@ -56,6 +58,10 @@ try:
         for recipe in read_planted(CONFIG["planted"])
         if recipe.base in CLIPS and CLIPS[recipe.base].dataset == EMBEDDED
     }
+    SIMILARITY = read_settings(
+        CONFIG["similarity"], ROOT / "workflow/schemas/similarity.schema.json"
+    )
+    TASKS = {task.task: task for task in read_tasks(CONFIG["adaptations"], set(CLIPS))}
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
 
@@ -77,8 +83,22 @@ PHYSICAL = [
     if row.level == "physical" or "nio" in row.experiments or id in PLATES
 ]
 
+# Motions that similar pairs are made of. Planted variants stand in for the embedded clips, whose
+# frames they share.
+SIMILAR = [
+    *(
+        f"captured/{id}"
+        for id, row in CLIPS.items()
+        if "similarity" in row.experiments and row.dataset != EMBEDDED
+    ),
+    *(f"planted/{id}" for id, recipe in PLANTED.items() if "similarity" in recipe.experiments),
+]
+TASKS = TASKS if SIMILAR else {}
+ADAPTED = [f"{task}{variant}" for task in TASKS for variant in ("", "_without_style")]
+
 
 wildcard_constraints:
+    task="|".join(TASKS) or "none",
     clip="|".join(CLIPS) or "none",
     planted="|".join(PLANTED) or "none",
 
@@ -145,7 +165,8 @@ def motion_files():
     """Return the files of every motion of this run."""
     captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
     captured += [MOTIONS / "captured" / f"{id}_physical.npz" for id in PHYSICAL]
-    return captured + [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    captured += [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    return captured + [MOTIONS / "adapted" / f"{id}.npz" for id in ADAPTED]
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
@@ -157,6 +178,12 @@ TABLES = [
     )
 ]
 
+SIMILARITY_TABLES = [
+    *("similarity_alignments", "similarity_sets", "leg_subspaces", "leakage", "one_class_svm"),
+    *("discrimination", "dose_response", "dose_points", "adaptations", "style_judgement"),
+]
+TABLES += [RESULTS / f"tables/{name}.csv" for name in SIMILARITY_TABLES if SIMILAR]
+
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {
     figure: [id for id in ids if id in CLIPS] or list(CLIPS)[:4]
@@ -167,6 +194,9 @@ FIGURES = ["body", "strips", "gait", "markers", "marker_fit"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates", "plate_moments"] if PLATES else []
 FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else []
+FIGURES += ["similarity_features", "leg_subspaces", "leakage", "discrimination"] if SIMILAR else []
+FIGURES += ["dose_response"] if SIMILAR and PLANTED else []
+FIGURES += ["adaptation_triptych", "adaptation_strips"] if TASKS else []
 
 
 def everything():

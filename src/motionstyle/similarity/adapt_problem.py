@@ -213,19 +213,31 @@ def torque_block(example: Example, holds: Footholds, settings: Mapping[str, Any]
     return Block("torque", function, index, parameters, empty, empty, inflation=TORQUE_INFLATION)
 
 
-def model_expressions(model: StyleModel, features: ca.MX) -> tuple[ca.MX, ca.MX]:
-    """Return f_s divided by |ρ|, and leak(p), of raw features (n), for CasADi."""
-    scaling = model.scaling
-    scaled = (features - ca.DM(scaling.mean)) / ca.DM(scaling.deviation)
+def _kernel(model: StyleModel, features: ca.MX, gamma: float) -> ca.MX:
+    """Return k of raw features (n) and all training patterns, (I)."""
+    scaled = (features - ca.DM(model.scaling.mean)) / ca.DM(model.scaling.deviation)
     patterns = ca.DM(model.patterns)
     squared = ca.sum2(patterns**2) + ca.sumsqr(scaled) - 2 * patterns @ scaled
-    svm = ca.exp(-model.svm_gamma * squared)
+    return ca.exp(-gamma * squared)
+
+
+def model_expressions(model: StyleModel, features: ca.MX) -> tuple[ca.MX, ca.MX]:
+    """Return f_s divided by |ρ|, and leak(p), of raw features (n), for CasADi."""
+    svm = _kernel(model, features, model.svm_gamma)
     score = (ca.dot(ca.DM(model.alphas), svm) - model.rho) / abs(model.rho)
-    kernel = ca.exp(-model.gamma * squared)
+    kernel = _kernel(model, features, model.gamma)
     mean = ca.sum1(kernel) / len(model.patterns)
     centred = kernel - mean - ca.DM(model.column_means) + model.grand_mean
     leak = 1 - 2 * mean + model.grand_mean - ca.sumsqr(ca.DM(model.axes).T @ centred)
     return score, leak
+
+
+def _own_part(joined: Array) -> Array:
+    """Return the entries of a pair's features that belong to its first segment."""
+    half = len(joined) // 2
+    if half != 9 * POSTURES:
+        return joined[:half]
+    return joined.reshape(POSTURES, 2, 9)[:, 0].ravel()
 
 
 def _style_functions(
@@ -241,20 +253,23 @@ def _style_functions(
     """Return the block of one pair, residual √w_p d_s and constraint f_s + slack ≥ 0, twice.
 
     own, other : both halves of the features, functions of z and p. The second function is the
-    Hessian of the block's Lagrangian: exact for f_s as a function of the features, Gauss–Newton's
-    for d_s and for the features as functions of z.
+    Hessian of the block's Lagrangian, kept positive semidefinite: the convex part of f_s, and
+    Gauss–Newton's for d_s and for the features as functions of z.
     """
     a, b = ca.MX.sym("a", own.shape[0]), ca.MX.sym("b", own.shape[0])
     score, leak = model_expressions(model, _joined(a, b))
     values = ca.Function("values", [a, b], [score, leak])
-    curved, _ = ca.hessian(score, a)
-    curvature = ca.Function("curvature", [a, b], [ca.densify(curved)])
     found, spread = values(own, other)
     residual = spread / settings["leakage"] * _weights(settings)[0]
     block = block_function(name, z, p, residual, found + slack)
     lam, factor = ca.MX.sym("lam", 1), ca.MX.sym("factor")
+    # of λ∇²f_s the part that is convex for λ ≤ 0, −2Γ Σ α k I in scaled features
+    weights = _own_part(1 / model.scaling.deviation**2)
+    total = ca.dot(ca.DM(model.alphas), _kernel(model, _joined(own, other), model.svm_gamma))
+    stiff = 2 * model.svm_gamma / abs(model.rho) * total * ca.fmax(-lam, 0)
     slope, steep = ca.jacobian(own, z), ca.jacobian(residual, z)
-    hessian = lam * slope.T @ curvature(own, other) @ slope + factor * steep.T @ steep
+    curved = slope.T @ (ca.repmat(ca.DM(weights), 1, z.shape[0]) * slope)
+    hessian = stiff * curved + factor * steep.T @ steep
     return block, ca.Function(f"{name}_hessian", [z, p, lam, factor], [ca.densify(hessian)])
 
 
@@ -275,9 +290,7 @@ def leg_style_block(
     """Return P and S of leg segments; z = 15 components of the new segment and its slack."""
     count = halves.shape[1]
     z, p = ca.MX.sym("z", count + 1), ca.MX.sym("p", count)
-    functions = _style_functions(
-        name, z, p, model, z[:count], p, z[count], settings
-    )
+    functions = _style_functions(name, z, p, model, z[:count], p, z[count], settings)
     lower = np.zeros((len(index), 1))
     return Block(name, functions[0], index, halves, lower, lower + np.inf, functions[1])
 
@@ -294,20 +307,14 @@ def whole_body_style_block(
     body = example.motion.body
     y, f = ca.SX.sym("y", WIDTH), ca.SX.sym("f", len(FIXED))
     pose = symbolic_pose(body, _full(y, f))
-    parts = [
-        pose.coms @ ca.DM(own * body.masses / (own * body.masses).sum()) for own in PART_NODES
-    ]
+    parts = [pose.coms @ ca.DM(own * body.masses / (own * body.masses).sum()) for own in PART_NODES]
     centre = pose.coms @ ca.DM(body.masses / body.mass)
-    posture = ca.Function(
-        "posture", [y, f], [ca.horzcat(*parts), centre, pose.forward]
-    )
+    posture = ca.Function("posture", [y, f], [ca.horzcat(*parts), centre, pose.forward])
     size, extra = POSTURES * WIDTH, 54 + 1
     z = ca.MX.sym("z", size + WIDTH + 1)
     p = ca.MX.sym("p", (POSTURES + 1) * len(FIXED) + extra)
     found = [
-        posture(
-            z[k * WIDTH : (k + 1) * WIDTH], p[k * len(FIXED) : (k + 1) * len(FIXED)]
-        )
+        posture(z[k * WIDTH : (k + 1) * WIDTH], p[k * len(FIXED) : (k + 1) * len(FIXED)])
         for k in range(POSTURES + 1)
     ]
     other = p[(POSTURES + 1) * len(FIXED) : -1]
@@ -400,16 +407,17 @@ def build_problem(
             own = [n for n, k in enumerate(judged) if pieces[k].segment.set == name]
             if not own:
                 continue
-            index = np.array(
-                [[*range(shown[n], shown[n + 1]), slack[len(whole) + n]] for n in own]
-            )
+            index = np.array([[*range(shown[n], shown[n + 1]), slack[len(whole) + n]] for n in own])
             halves = np.array([components_start[judged[n]][:features] for n in own])
             blocks.append(leg_style_block(name, models[name], index, halves, settings))
     equations = _subspace_equations(pieces, sizes, starts, spaces, count)
     if models:
         seen = [pieces[k].segment for k in judged]
         more = _feature_equations(seen, shown, spaces, features, count)
-        equations = (vstack([equations[0], more[0]], format="csc"), np.append(*[e[1] for e in (equations, more)]))
+        equations = (
+            vstack([equations[0], more[0]], format="csc"),
+            np.append(*[e[1] for e in (equations, more)]),
+        )
     linear, value = equations
     price = np.zeros(count)
     price[slack] = settings["slack_price"]

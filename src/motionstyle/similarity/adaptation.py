@@ -329,3 +329,22 @@ def pose_outlier(motion: Motion, bank: Bank, without: set[str]) -> float:
         )
         largest = max(largest, float(distances.max()))
     return largest
+
+
+def failed_rows(task: Task, reason: str, config: str) -> list[dict[str, object]]:
+    """Return the rows of a task that could not be posed at all."""
+    return [
+        {
+            "task": task.task,
+            "action": task.action,
+            "example": task.example,
+            "variant": variant,
+            "figure": task.figure or None,
+            "solved": False,
+            "status": "refused",
+            "reason": reason,
+            "balance_marked": task.balance,
+            "config": config,
+        }
+        for variant in VARIANTS
+    ]

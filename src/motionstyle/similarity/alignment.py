@@ -6,6 +6,7 @@ inside a segment but for its duration.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -60,20 +61,18 @@ def segments_of(events: Sequence[Event]) -> list[Segment]:
     """Return whole-body and leg segments between the first and the last of these events."""
     found = []
     borders = whole_body_borders(events)
-    for a, b in zip(borders, borders[1:], strict=False):
+    for a, b in itertools.pairwise(borders):
         label = describe([e.name for e in events[a : b + 1]])
         found.append(Segment("whole_body", events[a].frame, events[b].frame, label))
     for set_name, side in SIDE_OF_SET.items():
         own = [e for e in events if side in e.sides]
-        for a, b in zip(own, own[1:], strict=False):
+        for a, b in itertools.pairwise(own):
             on = a.kind == "touch" or (a.kind == "stand" and b.kind == "lift")
             found.append(Segment(set_name, a.frame, b.frame, "contact" if on else "no contact"))
     return [s for s in found if s.last - s.first >= 2]
 
 
-def common_run(
-    a: Sequence[tuple[str, str]], b: Sequence[tuple[str, str]]
-) -> tuple[int, int, int]:
+def common_run(a: Sequence[tuple[str, str]], b: Sequence[tuple[str, str]]) -> tuple[int, int, int]:
     """Return (start in a, start in b, length) of the longest common contiguous run."""
     best = (0, 0, 0)
     lengths = [0] * (len(b) + 1)

@@ -50,7 +50,11 @@ class Block:
 
 
 def block_function(
-    name: str, z: ca.SX | ca.MX, p: ca.SX | ca.MX, residuals: ca.SX | ca.MX, constraints: ca.SX | ca.MX
+    name: str,
+    z: ca.SX | ca.MX,
+    p: ca.SX | ca.MX,
+    residuals: ca.SX | ca.MX,
+    constraints: ca.SX | ca.MX,
 ) -> ca.Function:
     """Return the function of a block kind with its Jacobians."""
     outputs = [residuals, ca.jacobian(residuals, z), constraints, ca.jacobian(constraints, z)]
@@ -144,19 +148,7 @@ def assemble(
         (count, count),
         upper=True,
     )
-    options = {
-        "grad_f": ca.Function(
-            "nlp_grad_f", [x, p], [f, sum(gradient)], ["x", "p"], ["f", "grad:f:x"]
-        ),
-        "jac_g": ca.Function("nlp_jac_g", [x, p], [g, jacobian], ["x", "p"], ["g", "jac:g:x"]),
-        "hess_lag": ca.Function(
-            "nlp_hess_l",
-            [x, p, lam_f, lam_g],
-            [hessian],
-            ["x", "p", "lam:f", "lam:g"],
-            ["triu:hess:gamma:x:x"],
-        ),
-    }
+    options = _functions(x, p, (lam_f, lam_g), (f, g), (sum(gradient), jacobian, hessian))
     return Program(
         {"x": x, "f": f, "g": g},
         options,
@@ -166,6 +158,28 @@ def assemble(
         ca.Function("terms", [x], [ca.vertcat(*costs)]),
         tuple(block.name for block in blocks),
     )
+
+
+def _functions(
+    x: ca.MX,
+    p: ca.MX,
+    multipliers: tuple[ca.MX, ca.MX],
+    values: tuple[ca.MX, ca.MX],
+    derivatives: tuple[ca.MX, ca.MX, ca.MX],
+) -> dict[str, ca.Function]:
+    """Return the derivatives in the form in which `nlpsol` takes them."""
+    (f, g), (gradient, jacobian, hessian) = values, derivatives
+    return {
+        "grad_f": ca.Function("nlp_grad_f", [x, p], [f, gradient], ["x", "p"], ["f", "grad:f:x"]),
+        "jac_g": ca.Function("nlp_jac_g", [x, p], [g, jacobian], ["x", "p"], ["g", "jac:g:x"]),
+        "hess_lag": ca.Function(
+            "nlp_hess_l",
+            [x, p, *multipliers],
+            [hessian],
+            ["x", "p", "lam:f", "lam:g"],
+            ["triu:hess:gamma:x:x"],
+        ),
+    }
 
 
 def _mapped(function: ca.Function, z: ca.MX, p: ca.DM, number: int) -> list[ca.MX]:

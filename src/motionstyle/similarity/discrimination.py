@@ -91,10 +91,12 @@ def _level_sets(
         ),
         "subject": (
             lambda a, b: similar(a, b, sets) and a.source == b.source and one_subject(a, b),
-            lambda a, b: similar(a, b, sets)
-            and a.source == b.source
-            and bool(a.subject and b.subject)
-            and a.subject != b.subject,
+            lambda a, b: (
+                similar(a, b, sets)
+                and a.source == b.source
+                and bool(a.subject and b.subject)
+                and a.subject != b.subject
+            ),
         ),
     }
     found = []
@@ -130,10 +132,7 @@ def discrimination_rows(
             continue
         for name in SETS:
             one = similar_pairs[name]
-            if others is None:
-                other = _cross_type(bank, one, settings, spaces)
-            else:
-                other = others[name]
+            other = _cross_type(bank, one, settings, spaces) if others is None else others[name]
             rows += _rows_of_set(bank, one, other, spaces, settings, common)
     return rows
 
@@ -204,9 +203,7 @@ def _rows_of_set(
         position = np.full(len(one), -1)
         position[fold.train] = np.arange(len(fold.train))
         own = position[outer.origins] >= 0
-        inner = Mismatched(
-            outer.vectors[own], position[outer.origins[own]], outer.kinds[own]
-        )
+        inner = Mismatched(outer.vectors[own], position[outer.origins[own]], outer.kinds[own])
         widths = widths_for(train, inner, settings, seed + number)
         model = fit_model(
             train.vectors,
@@ -228,8 +225,12 @@ def _rows_of_set(
     rows = []
     for method in METHODS:
         low, high = interval(
-            inside[method], one.groups, outside[method], other.groups,
-            settings["validation"]["bootstraps"], seed,
+            inside[method],
+            one.groups,
+            outside[method],
+            other.groups,
+            settings["validation"]["bootstraps"],
+            seed,
         )
         rows.append(
             {

@@ -1,8 +1,8 @@
-"""Dose and response: do leakage and SVM score follow a planted change of known size?
+"""Dose and response: whether leakage and SVM score follow a planted change of known size.
 
 Pairs of an unchanged planted motion and one changed by a dose are scored by models that have seen
-no pair with an unchanged motion of that clip. A leg must not respond to what leaves it as it is:
-those rows are controls and are named so.
+neither of the two, nor any other dose of that series. A leg must not respond to what leaves it as
+it is: those rows are controls and are named so.
 """
 
 from __future__ import annotations
@@ -37,9 +37,7 @@ def _take(clip: Clip) -> str:
     return clip.base.rsplit("-", 1)[-1]
 
 
-def dose_rows(
-    bank: Bank, settings: Mapping[str, Any], config: str
-) -> tuple[list[Row], list[Row]]:
+def dose_rows(bank: Bank, settings: Mapping[str, Any], config: str) -> tuple[list[Row], list[Row]]:
     """Return the rank correlations and the points behind them; none without planted doses."""
     rows: list[Row] = []
     points: list[Row] = []
@@ -84,14 +82,13 @@ def dose_rows(
     return rows, points
 
 
-def _series_points(
-    bank: Bank, settings: Mapping[str, Any], series: str, action: str
-) -> list[Row]:
+def _series_points(bank: Bank, settings: Mapping[str, Any], series: str, action: str) -> list[Row]:
     """Return leakage and score of each pair (unchanged, dosed) of different takes."""
     undosed = {c.base for c in bank.clips if c.series == UNDOSED and c.action == action}
     if not undosed:
         raise MotionStyleError(f"no unchanged motion of action {action} to hold the doses against")
-    patterns, spaces, _ = paper_set(bank, settings, without=undosed)
+    changed = {c.base for c in bank.clips if c.series == series}
+    patterns, spaces, _ = paper_set(bank, settings, without=undosed | changed)
     parts = halves(bank, spaces, settings["leg_space"]["features"])
     chosen = []
     for pair in bank.pairs:

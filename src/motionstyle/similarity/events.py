@@ -7,6 +7,7 @@ lift-off that ends a double support and leaves no foot on the ground (a jump's t
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -120,7 +121,7 @@ def read_events(path: str | Path) -> dict[str, tuple[tuple[str, str, int], ...]]
     for clip, events in found.items():
         for side in SIDES:
             own = sorted((frame, kind) for s, kind, frame in events if s == side)
-            if any(a[1] == b[1] for a, b in zip(own, own[1:], strict=False)):
+            if any(a[1] == b[1] for a, b in itertools.pairwise(own)):
                 problems.append(
                     f"{path.name}: clip {clip}: touch and lift of one foot must take turns"
                 )
@@ -168,10 +169,10 @@ def clip_events(
     tolerance = rules.simultaneous_s * motion.rate_hz
     for side, kind, frame in changes:
         last = merged[-1] if merged else None
-        if last and last.kind == kind and last.sides not in {side, "lr"}:
-            if frame - last.frame <= tolerance:
-                merged[-1] = Event(last.frame, kind, "lr")
-                continue
+        paired = last and last.kind == kind and last.sides not in {side, "lr"}
+        if last and paired and frame - last.frame <= tolerance:
+            merged[-1] = Event(last.frame, kind, "lr")
+            continue
         merged.append(Event(frame, kind, side))
     longest = round(rules.standing_s * motion.rate_hz)
     if merged[0].name == ("lift", "lr"):
@@ -194,7 +195,7 @@ def whole_body_borders(events: Sequence[Event]) -> list[int]:
     borders = []
     for index, event in enumerate(events):
         take_off = event.name == ("lift", "lr")
-        if event.kind == "touch" or event.kind == "stand" or take_off:
+        if event.kind in {"touch", "stand"} or take_off:
             borders.append(index)
     return borders
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -162,9 +163,7 @@ def make_footholds(example: Example, task: Task) -> Footholds:
     if flight.any() and not flight.all():
         kept = frames[~flight]
         support = np.interp(frames, kept, support[~flight])
-    return Footholds(
-        targets, on, surface, support, centres, flight, _pelvis(example, moves, turns)
-    )
+    return Footholds(targets, on, surface, support, centres, flight, _pelvis(example, moves, turns))
 
 
 def _places(
@@ -255,9 +254,7 @@ def _surface(
     )
 
 
-def _pelvis(
-    example: Example, moves: Sequence[tuple[Array, Array, Array]], turns: Array
-) -> Array:
+def _pelvis(example: Example, moves: Sequence[tuple[Array, Array, Array]], turns: Array) -> Array:
     """Return the pelvis coordinates (F, 6), carried along with the footholds.
 
     In the middle of the time on a foothold the pelvis moves as that foothold does; in between,
@@ -266,7 +263,7 @@ def _pelvis(
     motion = example.motion
     frames = np.arange(motion.frames)
     touches = [*example.touches, motion.frames - 1]
-    middles = [(a + b) / 2 for a, b in zip(touches, touches[1:], strict=False)][: len(moves)]
+    middles = [(a + b) / 2 for a, b in itertools.pairwise(touches)][: len(moves)]
     while len(middles) < len(moves):
         middles.append(float(motion.frames - 1) + len(middles))
     phase = np.interp(frames, middles, np.arange(len(middles)))

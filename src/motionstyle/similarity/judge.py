@@ -1,4 +1,4 @@
-"""One judge for all three papers: how similar in style is a made motion to its example?
+"""One judge for all three papers: how similar in style a made motion is to its example.
 
 The models of the paper's set, fitted without the example and its mirrored copy, score all aligned
 segments of the motion and its example.
@@ -111,4 +111,17 @@ def judge(
         **{f"{n}_leakage": float(v.mean()) for n, v in leaks.items()},
         "least_svm_score": float(joined.min()),
         "share_inside": float(np.mean(joined >= 0)),
+    }
+
+
+def failed_row(sidecar: Mapping[str, Any], config: str) -> dict[str, object]:
+    """Return the row of a motion that could not be made, from its sidecar."""
+    known = sidecar["provenance"]
+    return {
+        "motion": sidecar["id"],
+        "kind": sidecar["kind"],
+        "example": known.get("example"),
+        "status": "not judged",
+        "reason": sidecar["reason"],
+        "config": config,
     }

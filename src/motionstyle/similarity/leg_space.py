@@ -68,6 +68,4 @@ def fit_leg_space(vectors: Array, leg: str) -> LegSpace:
     kept = variances > 1e-12 * variances[0]
     if variances[0] <= 0 or not kept.any():
         raise MotionStyleError(f"{leg}: all leg segments are equal, they span no subspace")
-    return LegSpace(
-        mean, (axes * signs[:, None])[kept].T, np.sqrt(variances[kept]), variances
-    )
+    return LegSpace(mean, (axes * signs[:, None])[kept].T, np.sqrt(variances[kept]), variances)

@@ -109,7 +109,7 @@ def fit_scaling(patterns: Array, name: str, standardise: bool = True) -> Scaling
 
 
 def median_squared_distance(patterns: Array) -> float:
-    """Return the median squared distance of patterns (I, n), the unit kernel widths are given in."""
+    """Return the median squared distance of patterns (I, n): the unit of kernel widths."""
     return float(np.median(pdist(patterns, "sqeuclidean")))
 
 
@@ -166,9 +166,7 @@ def fit_model(
     # with a hard margin ρ is the least score; LIBSVM finds it within its tolerance
     rho = float(scores.min()) if nu is None else float(svm.offset_[0] / total)
     axes, columns, grand = kernel_axes(np.exp(-gamma * distances), cutoff, name)
-    return StyleModel(
-        name, scaling, scaled, gamma, svm_gamma, alphas, rho, axes, columns, grand
-    )
+    return StyleModel(name, scaling, scaled, gamma, svm_gamma, alphas, rho, axes, columns, grand)
 
 
 def kernel_axes(gram: Array, cutoff: int, name: str) -> tuple[Array, Array, float]:

@@ -62,8 +62,7 @@ def leg_spaces(bank: Bank, without: Collection[str] = ()) -> dict[str, LegSpace]
     """Return the subspace of each leg, from all clips but those with these base names."""
     kept = np.array([clip.base not in without and clip.id == clip.base for clip in bank.clips])
     return {
-        name: fit_leg_space(bank.vectors[name][kept[bank.owners[name]]], name)
-        for name in SETS[1:]
+        name: fit_leg_space(bank.vectors[name][kept[bank.owners[name]]], name) for name in SETS[1:]
     }
 
 
@@ -125,8 +124,10 @@ def select_pairs(
         order = generator.permutation(len(candidates))
         swaps = generator.random(len(candidates)) < 0.5
         mirrored = np.array(
-            [any(bank.clips[c].id != bank.clips[c].base for c in (p.first, p.second))
-             for p in candidates]
+            [
+                any(bank.clips[c].id != bank.clips[c].base for c in (p.first, p.second))
+                for p in candidates
+            ]
         )
         order = np.concatenate([order[~mirrored[order]], order[mirrored[order]]])
         count = 0

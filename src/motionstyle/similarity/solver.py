@@ -64,9 +64,8 @@ def solve(
         If the start is not a number, or bounds contradict each other.
     """
     if not np.isfinite(start).all():
-        raise MotionStyleError(
-            f"the start of the program is not a number at variable {int(np.argmin(np.isfinite(start)))}"
-        )
+        place = int(np.argmin(np.isfinite(start)))
+        raise MotionStyleError(f"the start of the program is not a number at variable {place}")
     if (lower > upper).any():
         raise MotionStyleError(
             f"bounds of variable {int(np.argmax(lower > upper))} contradict each other"
@@ -77,14 +76,17 @@ def solve(
             "sb": "yes",
             "max_iter": max_iterations,
             "max_wall_time": float(time_limit_s),
-            # the objective is counted in squared standard deviations; thousands are usual
+            # The objective is counted in squared standard deviations, thousands are usual. One
+            # unit of the scaled gradient left is a foot that is 0.4 mm from its best place
+            # (contact weight 10, 2 mm), far below what is measured.
             "obj_scaling_factor": 1e-3,
-            "tol": 1e-2,
+            "tol": 1e-1,
             "constr_viol_tol": 1e-6,
-            "acceptable_tol": 1e-1,
+            "acceptable_tol": 1.0,
             "acceptable_constr_viol_tol": 1e-5,
+            "acceptable_compl_inf_tol": 1e-2,
             "acceptable_iter": 3,
-            "acceptable_obj_change_tol": 1e-5,
+            "acceptable_obj_change_tol": 1e-3,
             "linear_solver": "mumps",
             "mu_strategy": "adaptive",
             "nlp_scaling_method": "none",
@@ -95,9 +97,7 @@ def solve(
     }
     began = perf_counter()
     solver = ca.nlpsol("adaptation", "ipopt", program.nlp, options)
-    found = solver(
-        x0=start, lbx=lower, ubx=upper, lbg=program.lower, ubg=program.upper
-    )
+    found = solver(x0=start, lbx=lower, ubx=upper, lbg=program.lower, ubg=program.upper)
     seconds = perf_counter() - began
     stats = solver.stats()
     x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()

@@ -46,7 +46,7 @@ class Task:
     note: str = ""
 
     def rise(self, foothold: int) -> float:
-        """Return the height gained on reaching foothold 1, 2, …"""
+        """Return the height gained on reaching foothold 1, 2, …."""
         if not self.rises_m:
             return 0.0
         return self.rises_m[min(foothold, len(self.rises_m)) - 1]
