@@ -316,6 +316,5 @@ rule figure_adaptation_strips:
         mem_mb=1000,
     params:
         library=library(*SIMILARITY_ROOMS, "evaluation", "figures"),
-        tasks=[asdict(task) for task in TASKS.values()],
     script:
         "../scripts/figure_adaptation_strips.py"
