@@ -46,7 +46,6 @@ FIXED = np.setdiff1d(np.arange(len(COORDINATES)), MOVED)
 WIDTH = len(MOVED)
 _COLUMN = {"l": 6, "r": 6 + LEG_DOF}
 CLEARANCE_M = 0.002
-TORQUE_INFLATION = 3.0
 
 
 @dataclass(frozen=True)
@@ -210,7 +209,7 @@ def torque_block(example: Example, holds: Footholds, settings: Mapping[str, Any]
     index = np.arange(frames * WIDTH).reshape(frames, WIDTH)
     index = np.hstack([index[:-2], index[1:-1], index[2:]])
     empty = np.zeros((frames - 2, 0))
-    return Block("torque", function, index, parameters, empty, empty, inflation=TORQUE_INFLATION)
+    return Block("torque", function, index, parameters, empty, empty)
 
 
 def _kernel(model: StyleModel, features: ca.MX, gamma: float) -> ca.MX:
@@ -421,7 +420,7 @@ def build_problem(
     linear, value = equations
     price = np.zeros(count)
     price[slack] = settings["slack_price"]
-    program = assemble(count, blocks, linear, value, price)
+    program = assemble(count, blocks, linear, value, price, settings["caution"])
     begin = np.concatenate(
         [
             initial_frames(example, holds).ravel(),

@@ -10,7 +10,7 @@ f = Σ ½‖r‖² + priceᵀx, g = (c of all instances, A x).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -35,8 +35,6 @@ class Block:
     lower, upper : bounds of c, (N, len c).
     hessian : (z, p, multipliers of c, factor) → the Hessian of factor · ½‖r‖² + λᵀc, dense; or
         None for Gauss–Newton's.
-    inflation : factor on Gauss–Newton's, above 1 where a term is so curved that full steps would
-        swing to and fro.
     """
 
     name: str
@@ -46,7 +44,6 @@ class Block:
     lower: Array
     upper: Array
     hessian: ca.Function | None = None
-    inflation: float = 1.0
 
 
 def block_function(
@@ -83,8 +80,11 @@ def assemble(
     linear: csc_matrix,
     linear_value: Array,
     price: Array,
+    caution: float = 1.0,
 ) -> Program:
     """Return the program of all blocks, of A x = b, and of a linear price on variables.
+
+    caution : factor on all of Gauss and Newton's Hessians; above 1 steps are shorter and surer.
 
     Raises
     ------
@@ -93,61 +93,48 @@ def assemble(
     """
     x, p = ca.MX.sym("x", count), ca.MX.sym("p", 0)
     total = sum(len(b.index) * b.lower.shape[1] for b in blocks) + len(linear_value)
+    x, p = ca.MX.sym("x", count), ca.MX.sym("p", 0)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", total)
     costs, constraints, names = [], [], []
     gradient = [ca.MX(ca.DM(price))]
-    hessian_values, hessian_rows, hessian_columns = [], [], []
-    jacobian_values, jacobian_rows, jacobian_columns = [], [], []
-    lower, upper = [], []
-    start = 0
+    hessians, jacobians = _Entries(), _Entries()
+    lower, upper, start = [], [], 0
     for block in blocks:
         number, size = block.index.shape
         if block.index.size and (block.index.min() < 0 or block.index.max() >= count):
             raise MotionStyleError(f"block {block.name}: a variable index outside 0…{count - 1}")
         z = ca.reshape(x[block.index.ravel().tolist()], size, number)
-        r, jr, c, jc = _mapped(block.function, z, ca.DM(block.parameters.T), number)
+        parameters = ca.DM(block.parameters.T)
+        r, jr, c, jc = block.function.map(number)(z, parameters)
         residuals, rows = r.shape[0], c.shape[0]
         costs.append(ca.sumsqr(r) / 2 if residuals else ca.MX(0))
-        multipliers = ca.reshape(lam_g[start : start + number * rows], rows, number)
-        products = _products(residuals, size).map(number)
-        grad, hess = products(r, jr)
+        grad, hess = _products(residuals, size).map(number)(r, jr)
         gradient.append(_scatter(ca.vec(grad), block.index.ravel(), count))
-        hessian = lam_f * block.inflation * ca.vec(hess)
+        hessian = lam_f * caution * ca.vec(hess)
         if block.hessian is not None:
-            factor = ca.repmat(lam_f, 1, number)
-            parameters = ca.DM(block.parameters.T)
+            multipliers = ca.reshape(lam_g[start : start + number * rows], rows, number)
+            factor = ca.repmat(caution * lam_f, 1, number)
             hessian = ca.vec(block.hessian.map(number)(z, parameters, multipliers, factor))
-        hessian_rows.append(np.tile(block.index, (1, size)).ravel())  # rows run fastest
-        hessian_columns.append(np.repeat(block.index, size, axis=1).ravel())
-        hessian_values.append(hessian)
-        if rows:
-            constraints.append(ca.vec(c))
-            own = start + np.arange(number * rows).reshape(number, rows)
-            jacobian_rows.append(np.tile(own, (1, size)).ravel())
-            jacobian_columns.append(np.repeat(block.index, rows, axis=1).ravel())
-            jacobian_values.append(ca.vec(jc))
-            lower.append(block.lower.ravel())
-            upper.append(block.upper.ravel())
-            names += [block.name] * (number * rows)
-            start += number * rows
+        # CasADi stores by columns: rows run fastest
+        hessians.add(hessian, np.tile(block.index, (1, size)), np.repeat(block.index, size, axis=1))
+        own = start + np.arange(number * rows).reshape(number, rows)
+        constraints.append(ca.vec(c))
+        jacobians.add(ca.vec(jc), np.tile(own, (1, size)), np.repeat(block.index, rows, axis=1))
+        lower.append(block.lower.ravel())
+        upper.append(block.upper.ravel())
+        names += [block.name] * (number * rows)
+        start += number * rows
     a = linear.tocoo()
-    constraints.append(ca.MX(_dm(linear)) @ x)
-    jacobian_rows.append(start + a.row)
-    jacobian_columns.append(a.col)
-    jacobian_values.append(ca.MX(ca.DM(a.data)))
+    jacobians.add(ca.MX(ca.DM(a.data)), start + a.row, a.col)
+    every = np.arange(count)
+    hessians.add(ca.MX(ca.DM.zeros(count)), every, every)  # a diagonal entry for each variable
+    g = ca.vertcat(*constraints, ca.MX(_dm(linear)) @ x)
+    f = sum(costs) + ca.dot(ca.DM(price), x)
     lower.append(linear_value)
     upper.append(linear_value)
     names += ["leg subspace"] * len(linear_value)
-    g = ca.vertcat(*constraints)
-    f = sum(costs) + ca.dot(ca.DM(price), x)
-    jacobian = _sparse(jacobian_values, jacobian_rows, jacobian_columns, (total, count))
-    hessian = _sparse(
-        [*hessian_values, ca.MX(ca.DM.zeros(count))],
-        [*hessian_rows, np.arange(count)],
-        [*hessian_columns, np.arange(count)],
-        (count, count),
-        upper=True,
-    )
+    jacobian = jacobians.matrix((total, count))
+    hessian = hessians.matrix((count, count), upper=True)
     options = _functions(x, p, (lam_f, lam_g), (f, g), (sum(gradient), jacobian, hessian))
     return Program(
         {"x": x, "f": f, "g": g},
@@ -182,11 +169,6 @@ def _functions(
     }
 
 
-def _mapped(function: ca.Function, z: ca.MX, p: ca.DM, number: int) -> list[ca.MX]:
-    """Return a block function's outputs for all instances, side by side."""
-    return list(function.map(number)(z, p))
-
-
 def _products(residuals: int, size: int) -> ca.Function:
     """Return (r, J) → (Jᵀr, JᵀJ)."""
     r, j = ca.MX.sym("r", residuals), ca.MX.sym("j", residuals, size)
@@ -207,22 +189,29 @@ def _scatter(values: ca.MX, index: NDArray[np.int64], count: int) -> ca.MX:
     return ca.MX(_dm(matrix.tocsc())) @ values
 
 
-def _sparse(
-    values: Sequence[ca.MX],
-    rows: Sequence[NDArray[np.int64]],
-    columns: Sequence[NDArray[np.int64]],
-    shape: tuple[int, int],
-    *,
-    upper: bool = False,
-) -> ca.MX:
-    """Return the sparse matrix in which values are added up at (row, column)."""
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    every = ca.vertcat(*values)
-    kept = np.flatnonzero(row <= column) if upper else np.arange(len(row))
-    keys = column[kept] * shape[0] + row[kept]
-    unique, place = np.unique(keys, return_inverse=True)
-    gather = coo_matrix((np.ones(len(kept)), (place, kept)), (len(unique), len(row))).tocsc()
-    pattern = ca.Sparsity.triplet(
-        *shape, (unique % shape[0]).tolist(), (unique // shape[0]).tolist()
-    )
-    return ca.sparsity_cast(ca.MX(_dm(gather)) @ every, pattern)
+@dataclass
+class _Entries:
+    """Entries (value, row, column) of a sparse matrix; equal places add up."""
+
+    values: list[ca.MX] = field(default_factory=list)
+    rows: list[NDArray[np.int64]] = field(default_factory=list)
+    columns: list[NDArray[np.int64]] = field(default_factory=list)
+
+    def add(self, values: ca.MX, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
+        """Add entries in the order of the raveled index arrays."""
+        self.values.append(values)
+        self.rows.append(np.asarray(rows).ravel())
+        self.columns.append(np.asarray(columns).ravel())
+
+    def matrix(self, shape: tuple[int, int], *, upper: bool = False) -> ca.MX:
+        """Return the matrix, or its upper triangle."""
+        row, column = np.concatenate(self.rows), np.concatenate(self.columns)
+        kept = np.flatnonzero(row <= column) if upper else np.arange(len(row))
+        keys = column[kept] * shape[0] + row[kept]
+        unique, place = np.unique(keys, return_inverse=True)
+        ones = np.ones(len(kept))
+        gather = coo_matrix((ones, (place, kept)), (len(unique), len(row))).tocsc()
+        pattern = ca.Sparsity.triplet(
+            *shape, (unique % shape[0]).tolist(), (unique // shape[0]).tolist()
+        )
+        return ca.sparsity_cast(ca.MX(_dm(gather)) @ ca.vertcat(*self.values), pattern)
