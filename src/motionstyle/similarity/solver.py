@@ -6,7 +6,7 @@ CasADi returns a point whether or not the solver succeeded; nothing here takes i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from time import perf_counter
+from time import process_time
 
 import casadi as ca
 import numpy as np
@@ -27,7 +27,8 @@ class Solution:
     Attributes
     ----------
     x : variables. status : `converged`, `acceptable`, or the solver's own word for its failure.
-    iterations, seconds : spent. violation : largest violation of a constraint.
+    iterations, seconds : spent, the latter of the processor, whatever else the machine does.
+    violation : largest violation of a constraint.
     worst : the block that constraint is of. diagnosis : one sentence, empty if solved.
     costs : each block's share of the objective.
     """
@@ -95,10 +96,10 @@ def solve(
         "print_time": False,
         **program.options,
     }
-    began = perf_counter()
+    began = process_time()
     solver = ca.nlpsol("adaptation", "ipopt", program.nlp, options)
     found = solver(x0=start, lbx=lower, ubx=upper, lbg=program.lower, ubg=program.upper)
-    seconds = perf_counter() - began
+    seconds = process_time() - began
     stats = solver.stats()
     x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
     raw = str(stats["return_status"])

@@ -254,7 +254,7 @@ def _validate(
     study: Study,
     kept: dict[str, Array],
 ) -> None:
-    """Add the rows of one set: three ways of folds, the curve against width, three margins."""
+    """Add the rows of one set: three ways of folds; of the paper's also widths and margins."""
     models = settings["models"]
     cutoff = models["cutoff"][patterns.name]
     paper = {"paper_mean": PAPER_MEAN, "paper_share_below_0_2": PAPER_SHARE}
@@ -276,7 +276,7 @@ def _validate(
         width = float(np.median(scores.svm_width))
         inside = inside_share(patterns, width, None, cutoff)
         study.svm.append(svm | {"status": "ok"} | _svm_row(scores, inside))
-        if way != "pattern":
+        if way != "pattern" or common["size"] != "paper":
             continue
         for nu in models["nu"]:
             inside = inside_share(patterns, width, nu, cutoff)
