@@ -14,9 +14,12 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.figures.skeleton import BONES, named_points
 from motionstyle.figures.style import (
     GROUND,
+    LEFT,
+    RIGHT,
     SERIES,
     SIDE_COLOURS,
     SIDE_LINES,
+    TRUNK,
     motion_title,
     new_figure,
     series_style,
@@ -37,6 +40,7 @@ Array = NDArray[np.float64]
 Table = Sequence[Mapping[str, str]]
 TITLES = {"whole_body": "whole body", "left_leg": "left leg", "right_leg": "right leg"}
 PAPER = "#000000"
+_COLOURS = {"upper_body": TRUNK, "left_leg": LEFT, "right_leg": RIGHT}
 _MARKS = {"upper_body": "s", "left_leg": "o", "right_leg": "D"}
 _METHODS = {
     "one_class_svm": "one-class SVM",
@@ -94,7 +98,7 @@ def features_figure(motion: Motion, rules: EventRules) -> Figure:
                 place[number, 1],
                 _MARKS[part],
                 ms=5,
-                mfc=SERIES[number],
+                mfc=_COLOURS[part],
                 mec="black",
                 mew=0.5,
                 zorder=5,
@@ -110,7 +114,7 @@ def features_figure(motion: Motion, rules: EventRules) -> Figure:
             vectors[:, number, 0],
             vectors[:, number, 1],
             "-",
-            color=SERIES[number],
+            color=_COLOURS[part],
             linewidth=0.8,
             marker=_MARKS[part],
             ms=5,

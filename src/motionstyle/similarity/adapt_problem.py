@@ -309,21 +309,21 @@ def whole_body_style_block(
     parts = [pose.coms @ ca.DM(own * body.masses / (own * body.masses).sum()) for own in PART_NODES]
     centre = pose.coms @ ca.DM(body.masses / body.mass)
     posture = ca.Function("posture", [y, f], [ca.horzcat(*parts), centre, pose.forward])
-    size, extra = POSTURES * WIDTH, 54 + 1
+    size, extra = POSTURES * WIDTH, 54 + POSTURES
     z = ca.MX.sym("z", size + WIDTH + 1)
     p = ca.MX.sym("p", (POSTURES + 1) * len(FIXED) + extra)
     found = [
         posture(z[k * WIDTH : (k + 1) * WIDTH], p[k * len(FIXED) : (k + 1) * len(FIXED)])
         for k in range(POSTURES + 1)
     ]
-    other = p[(POSTURES + 1) * len(FIXED) : -1]
+    other, levels = p[(POSTURES + 1) * len(FIXED) : -POSTURES], p[-POSTURES:]
     forward = found[-1][2]
     length = ca.sqrt(forward[0] ** 2 + forward[2] ** 2)
     c, s = -forward[0] / length, -forward[2] / length
     first = found[0][1]
-    origin = ca.vertcat(first[0], p[-1], first[2])
     own = []
     for k in range(POSTURES):
+        origin = ca.vertcat(first[0], levels[k], first[2])
         local = (found[k][0] - ca.repmat(origin, 1, 3)) / body.leg_length
         x, up, side = local[0, :], local[1, :], local[2, :]
         own.append(ca.vec(ca.vertcat(c * x + s * side, up, c * side - s * x)))
@@ -339,8 +339,7 @@ def whole_body_style_block(
         index = (chosen[:, None] * WIDTH + np.arange(WIDTH)).ravel()
         indices.append(np.append(index, own_slack))
         half = whole_body_vector(example.motion, segment)
-        level = float(holds.support[segment.first : segment.last + 1].mean())
-        parameters.append(np.concatenate([fixed[chosen].ravel(), half, [level]]))
+        parameters.append(np.concatenate([fixed[chosen].ravel(), half, holds.support[frames]]))
     lower = np.zeros((len(indices), 1))
     return Block(
         "whole_body",

@@ -6,8 +6,6 @@ K = 6 postures of a whole-body segment, 9 numbers each: three centres of mass ti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -104,8 +102,8 @@ def whole_body_vector(motion: Motion, segment: Segment) -> Array:
     """Return the 54 numbers of one motion's whole-body segment: K postures × 3 centres × 3.
 
     The character faces −x (left on paper) as judged from the pelvis in the middle of the segment;
-    the origin is the floor below the body's centre of mass at the segment's first posture.
-    Lengths are divided by the leg's.
+    the origin lies below the body's centre of mass at the segment's first posture, on the ground
+    of each posture. Lengths are divided by the leg's.
 
     Raises
     ------
@@ -126,25 +124,20 @@ def whole_body_vector(motion: Motion, segment: Segment) -> Array:
     c, s = -heading[0] / size, -heading[2] / size
     # turns `heading` into −x about the vertical
     turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    origin = np.array([centre[0, 0], support_height(motion, segment), centre[0, 2]])
-    local = (parts[:-1] - origin) @ turn.T / motion.body.leg_length
+    origin = np.tile(centre[0], (len(frames), 1))
+    origin[:, 1] = support_heights(motion, frames)
+    local = (parts[:-1] - origin[:, None]) @ turn.T / motion.body.leg_length
     return local.ravel()
 
 
-def support_height(motion: Motion, segment: Segment) -> float:
-    """Return the mean height (m) of what bears in a segment, 0 on a level floor."""
+def support_heights(motion: Motion, frames: NDArray[np.int64]) -> Array:
+    """Return the height (m) of the ground under the body at frames (F,), 0 on a level floor.
+
+    On steps the adapted motion says it itself, smoothly from foothold to foothold, so that a walk
+    up or down is described as above its own ground.
+    """
     heights = motion.provenance.get("support_height_m")
-    if heights is None:
-        return 0.0
-    return float(np.mean(heights[segment.first : segment.last + 1]))
-
-
-@dataclass(frozen=True)
-class PairFeatures:
-    """Feature vectors of the pairs of one set, (I, n), and the label of each pair's segments."""
-
-    vectors: Array
-    labels: tuple[str, ...]
+    return np.zeros(len(frames)) if heights is None else np.asarray(heights, float)[frames]
 
 
 def pair_vector(first: Array, second: Array) -> Array:

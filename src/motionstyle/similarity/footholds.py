@@ -57,7 +57,7 @@ class Footholds:
     Attributes
     ----------
     targets : (F, 8, 3) m, of use where `bearing` (F, 8).
-    surface : the ground. support : height (m) of the bearing feet per frame, (F,).
+    surface : the ground. support : height (m) of the ground under the body, (F,).
     centres : centre of support (F, 3), m; flight : whether no foot bears, (F,).
     pelvis : start of the six pelvis coordinates, (F, 6). turn : heading gained, rad (F,).
     """
@@ -156,14 +156,10 @@ def make_footholds(example: Example, task: Task) -> Footholds:
     surface = _surface(task, points, on, numbers, moves, places)
     level = places[:, 1]
     flight = ~on.any(axis=1)
-    frames = np.arange(motion.frames)
     weight = on / np.maximum(on.sum(axis=1, keepdims=True), 1)
-    support = (weight * level[numbers]).sum(axis=1)
     centres = np.einsum("fp,fpa->fa", weight, targets)
-    if flight.any() and not flight.all():
-        kept = frames[~flight]
-        support = np.interp(frames, kept, support[~flight])
-    return Footholds(targets, on, surface, support, centres, flight, _pelvis(example, moves, turns))
+    pelvis, support = _pelvis(example, moves, turns, level)
+    return Footholds(targets, on, surface, support, centres, flight, pelvis)
 
 
 def _places(
@@ -254,8 +250,10 @@ def _surface(
     )
 
 
-def _pelvis(example: Example, moves: Sequence[tuple[Array, Array, Array]], turns: Array) -> Array:
-    """Return the pelvis coordinates (F, 6), carried along with the footholds.
+def _pelvis(
+    example: Example, moves: Sequence[tuple[Array, Array, Array]], turns: Array, level: Array
+) -> tuple[Array, Array]:
+    """Return the pelvis coordinates (F, 6) and the ground's height (F,), from foothold to foothold.
 
     In the middle of the time on a foothold the pelvis moves as that foothold does; in between,
     smoothly from one to the next.
@@ -279,4 +277,5 @@ def _pelvis(example: Example, moves: Sequence[tuple[Array, Array, Array]], turns
     angle = (1 - smooth) * turns[whole] + smooth * turns[after]
     turned = _yaw(angle) @ exponential(motion.coordinates[:, 3:6])
     vectors, _ = unroll(logarithm(turned))
-    return np.hstack([blended, vectors])
+    support = (1 - smooth) * level[whole] + smooth * level[after]
+    return np.hstack([blended, vectors]), support
