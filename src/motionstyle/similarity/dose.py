@@ -89,6 +89,10 @@ def _series_points(bank: Bank, settings: Mapping[str, Any], series: str, action:
         raise MotionStyleError(f"no unchanged motion of action {action} to hold the doses against")
     changed = {c.base for c in bank.clips if c.series == series}
     patterns, spaces, _ = paper_set(bank, settings, without=undosed | changed)
+    if action not in patterns["whole_body"].types:
+        raise MotionStyleError(
+            f"without the unchanged motions no similar pair of action {action} is left"
+        )
     parts = halves(bank, spaces, settings["leg_space"]["features"])
     chosen = []
     for pair in bank.pairs:
