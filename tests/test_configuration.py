@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 SCHEMA = ROOT / "workflow" / "schemas" / "config.schema.json"
 NAMES = (
     *("motions.tsv", "datasets.tsv", "embedded.yaml", "claims.yaml"),
-    *("planted.yaml", "normative_gait.yaml"),
+    *("planted.yaml", "normative_gait.yaml", "similarity.yaml", "adaptations.tsv"),
 )
 
 
