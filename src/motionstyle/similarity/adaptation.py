@@ -18,7 +18,7 @@ from motionstyle.body.kinematics import contact_points, forward_kinematics
 from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.floor import runs
 from motionstyle.motion.motion import Motion
-from motionstyle.similarity.adapt_problem import MOVED, WIDTH, build_problem
+from motionstyle.similarity.adapt_problem import MOVED, WIDTH, AdaptProblem, build_problem
 from motionstyle.similarity.alignment import SETS, SIDE_OF_SET
 from motionstyle.similarity.bank import Bank
 from motionstyle.similarity.features import (
@@ -51,7 +51,7 @@ ADAPTATION_COLUMNS = (
     *("whole_body_leakage", "left_leg_leakage", "right_leg_leakage", "pose_outlier"),
     *("speed_ratio", "leakage_ratio", "distorted", "components", "settings_id"),
     *("balance_marked", "whole_body_segments", "leg_segments", "training_patterns", "frames"),
-    *("variables", "iterations", "seconds", "config"),
+    *("variables", "attempts", "iterations", "seconds", "config"),
 )
 
 
@@ -126,30 +126,58 @@ def adapt(
     own = measure(example.motion, example, holds, style, bank, settings)
     found = {"example": Adapted(None, common | own | {"variant": "example", "status": "not run"})}
     for variant in VARIANTS:
+        models = style.models if variant == "full" else None
+        problem, solution, attempts = _solve_patiently(
+            example, holds, style.spaces, models, settings, components, marked
+        )
+        row = common | {"variant": variant, "variables": len(problem.start), "attempts": attempts}
+        slack = solution.x[len(solution.x) - len(problem.scores) :] if problem.scores else None
+        found[variant] = _finish(
+            solution, slack, example, holds, task, variant, style, bank, settings, row, own
+        )
+    return found
+
+
+def _solve_patiently(
+    example: Example,
+    holds: Footholds,
+    spaces: Mapping[str, LegSpace],
+    models: Mapping[str, StyleModel] | None,
+    settings: Mapping[str, Any],
+    components: int,
+    marked: NDArray[np.bool_],
+) -> tuple[AdaptProblem, Solution, int]:
+    """Return a program, its solution and the number of attempts.
+
+    Where the solver does not converge it goes on from its last point with twice the caution, for
+    all tasks alike. Iterations and seconds are those of all attempts.
+    """
+    part = settings["adaptation"]
+    start, iterations, seconds = None, 0, 0.0
+    for attempt in range(1, part["attempts"] + 1):
         problem = build_problem(
             example,
             holds,
-            style.spaces,
-            style.models if variant == "full" else None,
-            part,
+            spaces,
+            models,
+            part | {"caution": part["caution"] * 2 ** (attempt - 1)},
             components,
             settings["leg_space"]["features"],
             marked,
         )
         solution = solve(
             problem.program,
-            problem.start,
+            problem.start if start is None else start,
             problem.lower,
             problem.upper,
             max_iterations=part["max_iterations"],
             time_limit_s=part["time_limit_s"],
         )
-        row = common | {"variant": variant, "variables": len(problem.start)}
-        slack = solution.x[len(solution.x) - len(problem.scores) :] if problem.scores else None
-        found[variant] = _finish(
-            solution, slack, example, holds, task, variant, style, bank, settings, row, own
-        )
-    return found
+        iterations, seconds = iterations + solution.iterations, seconds + solution.seconds
+        if solution.solved or not np.isfinite(solution.x).all():
+            break
+        start = solution.x
+    return problem, replace(solution, iterations=iterations, seconds=seconds), attempt
 
 
 def _finish(
