@@ -169,6 +169,12 @@ def motion_files():
     return captured + [MOTIONS / "adapted" / f"{id}.npz" for id in ADAPTED]
 
 
+def made_motions():
+    """Return the motions of the kinds that are judged against their example."""
+    kinds = SIMILARITY["judge"]["kinds"]
+    return [file for file in motion_files() if file.parent.name in kinds]
+
+
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
 TABLES = [
     RESULTS / f"tables/{name}.csv"

@@ -4,12 +4,6 @@ SIMILARITY_ROOMS = ("body", "motion", "mocap", "dynamics", "similarity")
 BANK = RESULTS / "similarity/bank.npz"
 
 
-def made_motions():
-    """Return the motions of the kinds that are judged against their example."""
-    kinds = SIMILARITY["judge"]["kinds"]
-    return [file for file in motion_files() if file.parent.name in kinds]
-
-
 rule similarity_bank:
     input:
         motions=[MOTIONS / f"{id}.npz" for id in SIMILAR],
