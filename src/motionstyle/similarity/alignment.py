@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.similarity.events import (
-    SIDES,
     ClipEvents,
     Event,
     EventRules,
@@ -117,11 +116,3 @@ def align(a: ClipEvents, b: ClipEvents, rules: EventRules) -> Alignment:
 def all_segments(events: ClipEvents) -> list[Segment]:
     """Return every segment of a clip that lies between two of its events."""
     return segments_of(events.events)
-
-
-def leg_segments(events: ClipEvents) -> list[Segment]:
-    """Return the leg segments of a clip, for the subspaces of §4."""
-    return [s for s in all_segments(events) if s.set in SIDE_OF_SET]
-
-
-__all__ = ["SETS", "SIDES", "Alignment", "Segment", "align", "all_segments", "leg_segments"]

@@ -8,8 +8,8 @@ lift-off that ends a double support and leaves no foot on the ground (a jump's t
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,6 @@ import numpy as np
 from motionstyle.body.layout import CONTACT_POINTS
 from motionstyle.errors import MotionStyleError
 from motionstyle.mocap.cells import Cells
-from motionstyle.mocap.floor import runs
 from motionstyle.motion.motion import Motion
 
 SIDES = ("l", "r")
@@ -62,11 +61,10 @@ class EventRules:
 
 @dataclass(frozen=True)
 class ClipEvents:
-    """The events of one clip in order, and the frames at which each foot's support changes."""
+    """The events of one clip in order."""
 
     clip: str
     events: tuple[Event, ...]
-    by_side: Mapping[str, tuple[Event, ...]] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[tuple[str, str], ...]:
@@ -183,11 +181,7 @@ def clip_events(
         # after landing on both feet, one is lifted: the landing ends there at the latest
         first = merged[-2].frame
         merged[-1] = Event(min(merged[-1].frame, first + longest), "stand", "lr")
-    return ClipEvents(
-        motion.id,
-        tuple(merged),
-        {side: tuple(e for e in merged if side in e.sides) for side in SIDES},
-    )
+    return ClipEvents(motion.id, tuple(merged))
 
 
 def whole_body_borders(events: Sequence[Event]) -> list[int]:
@@ -198,8 +192,3 @@ def whole_body_borders(events: Sequence[Event]) -> list[int]:
         if event.kind in {"touch", "stand"} or take_off:
             borders.append(index)
     return borders
-
-
-def contact_runs(motion: Motion, side: str) -> list[tuple[int, int]]:
-    """Return (first, last) frame of each support of a foot."""
-    return [(int(a), int(b)) for a, b in runs(bearing(motion)[side])]
