@@ -13,8 +13,10 @@ from motionstyle.body.kinematics import contact_points, forward_kinematics, poin
 from motionstyle.body.layout import NODES
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.storage import load_motion, save_motion
-from motionstyle.similarity.adapt_problem import MOVED, WIDTH, build_problem, leg_pieces
-from motionstyle.similarity.adaptation import adapt, measure, models_without, pair_scores
+from motionstyle.similarity.adapt_measures import measure, models_without, pair_scores
+from motionstyle.similarity.adapt_problem import build_problem, leg_pieces
+from motionstyle.similarity.adapt_terms import MOVED, WIDTH
+from motionstyle.similarity.adaptation import adapt
 from motionstyle.similarity.blocks import Block, assemble, block_function
 from motionstyle.similarity.footholds import cut_example, make_footholds
 from motionstyle.similarity.judge import judge, judge_motions

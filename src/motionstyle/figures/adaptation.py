@@ -58,7 +58,7 @@ def _draw(axes: Axes, motion: Motion, surface: Surface, frames: Sequence[int]) -
         axes.plot(*head, "o", ms=4.5, mfc="none", mec="#555555", alpha=float(shade))
     every = np.concatenate([path[list(frames)] for path in flat.values()])
     left, right = every[:, 0].min() - MARGIN_M, every[:, 0].max() + MARGIN_M
-    u = np.linspace(left, right, 800)
+    u = np.linspace(left - 1, right + 1, 1200)  # axes that are shared may show more
     ground = surface.height_at(u)
     axes.fill_between(u, ground, min(ground.min(), 0.0) - 0.12, color="#DDDDDD", zorder=0)
     axes.plot(u, ground, color=GROUND, linewidth=0.8, zorder=0.5)

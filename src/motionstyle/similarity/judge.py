@@ -13,7 +13,7 @@ import numpy as np
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
-from motionstyle.similarity.adaptation import StyleModels, models_without
+from motionstyle.similarity.adapt_measures import StyleModels, models_without
 from motionstyle.similarity.alignment import SETS, align
 from motionstyle.similarity.bank import Bank
 from motionstyle.similarity.events import clip_events
