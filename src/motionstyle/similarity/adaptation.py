@@ -18,7 +18,7 @@ from motionstyle.similarity.adapt_measures import StyleModels, measure, models_w
 from motionstyle.similarity.adapt_problem import AdaptProblem, build_problem
 from motionstyle.similarity.adapt_terms import MOVED, WIDTH
 from motionstyle.similarity.alignment import SIDE_OF_SET
-from motionstyle.similarity.bank import Bank
+from motionstyle.similarity.bank import Bank, describe_clip
 from motionstyle.similarity.footholds import Example, Footholds, cut_example, make_footholds
 from motionstyle.similarity.leg_space import LegSpace
 from motionstyle.similarity.models import StyleModel
@@ -38,7 +38,7 @@ ADAPTATION_COLUMNS = (
     *("whole_body_leakage", "left_leg_leakage", "right_leg_leakage", "pose_outlier"),
     *("speed_ratio", "leakage_ratio", "distorted", "components", "settings_id"),
     *("balance_marked", "whole_body_segments", "leg_segments", "training_patterns", "frames"),
-    *("variables", "attempts", "iterations", "seconds", "config"),
+    *("variables", "attempts", "iterations", "seconds", "data", "config"),
 )
 
 
@@ -84,6 +84,7 @@ def adapt(
         "figure": task.figure or None,
         "components": components,
         "settings_id": settings_id(settings),
+        "data": describe_clip(motion).data,
         "balance_marked": task.balance,
         "whole_body_segments": sum(s.set == "whole_body" for s in example.segments),
         "leg_segments": sum(s.set in SIDE_OF_SET for s in example.segments),

@@ -47,6 +47,11 @@ class Clip:
     series: str
     dose: float | None
 
+    @property
+    def data(self) -> str:
+        """Whether it is `planted` or `captured`, as tables say it."""
+        return "planted" if self.planted else "captured"
+
 
 @dataclass(frozen=True)
 class Pair:
