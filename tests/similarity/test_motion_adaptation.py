@@ -331,7 +331,7 @@ def test_the_shipped_tasks_are_six_of_each_kind_and_settings_are_one():
     settings = read_settings(
         ROOT / "config/similarity.yaml", ROOT / "workflow/schemas/similarity.schema.json"
     )
-    assert not {t.example for t in tasks} & set(settings["development"])
+    assert not {t.example for t in tasks} & set(settings["held_back"])
     assert read_tasks(ROOT / "config/adaptations.tsv", set()) == ()
 
 
