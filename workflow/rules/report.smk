@@ -148,7 +148,6 @@ rule publish:
                 *("body", "clips", "gait_angles", "gait", "claims"),
                 *("physical", "force_plates", "joint_moments", "plate_moments", "root_residual"),
                 "benchmark_dynamics",
-                *("physical", "force_plates"),
                 *(SIMILARITY_TABLES if SIMILAR else ()),
             )
         ],

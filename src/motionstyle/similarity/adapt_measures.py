@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from motionstyle.body.kinematics import contact_points, forward_kinematics
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.floor import runs
+from motionstyle.mocap.fitting.floor import runs
 from motionstyle.motion.motion import Motion
 from motionstyle.similarity.adapt_terms import MOVED
 from motionstyle.similarity.alignment import SETS, SIDE_OF_SET

@@ -16,7 +16,7 @@ import numpy as np
 
 from motionstyle.body.layout import CONTACT_POINTS
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.cells import Cells
+from motionstyle.mocap.datasets.cells import Cells
 from motionstyle.motion.motion import Motion
 
 SIDES = ("l", "r")

@@ -13,7 +13,7 @@ from motionstyle.body.kinematics import contact_points
 from motionstyle.body.layout import CONTACT_POINTS
 from motionstyle.body.rotations import exponential, logarithm, unroll
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.floor import runs
+from motionstyle.mocap.fitting.floor import runs
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import resample
 from motionstyle.similarity.alignment import Segment, segments_of

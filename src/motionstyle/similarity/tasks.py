@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.cells import Cells, finite
+from motionstyle.mocap.datasets.cells import Cells, finite
 
 COLUMNS = (
     *("task", "action", "example", "first_segment", "segments", "stride", "rises_m"),
