@@ -14,6 +14,7 @@ include: "workflow/rules/physics.smk"
 include: "workflow/rules/moments.smk"
 include: "workflow/rules/spacetime.smk"
 include: "workflow/rules/solvers.smk"
+include: "workflow/rules/similarity.smk"
 include: "workflow/rules/evaluation.smk"
 include: "workflow/rules/report.smk"
 

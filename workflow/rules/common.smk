@@ -17,12 +17,14 @@ from motionstyle.mocap.planted.variants import read_planted
 from motionstyle.mocap.datasets.sheet import EMBEDDED, MARKER_FILES, read_sheet
 from motionstyle.mocap.datasets.wheel import read_wheel_pin
 from motionstyle.spacetime.synthesis_sheet import read_syntheses
+from motionstyle.similarity.settings import read_settings
+from motionstyle.similarity.tasks import read_tasks
 
 ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
 PATH_KEYS = (
     *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
-    *("planted", "normative", "syntheses"),
+    *("planted", "normative", "syntheses", "similarity", "adaptations"),
 )
 
 
@@ -66,6 +68,10 @@ try:
         for row in read_syntheses(CONFIG["syntheses"], None if SHIPPED else CLIPS)
         if all(id in CLIPS for id in (*row.clips, *row.others))
     }
+    SIMILARITY = read_settings(
+        CONFIG["similarity"], ROOT / "workflow/schemas/similarity.schema.json"
+    )
+    TASKS = {task.task: task for task in read_tasks(CONFIG["adaptations"], set(CLIPS))}
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
 
@@ -110,8 +116,22 @@ PHYSICAL = [
     or any(id in synthesis.clips for synthesis in SYNTHESES.values())
 ]
 
+# Motions that similar pairs are made of. Planted variants stand in for the embedded clips, whose
+# frames they share.
+SIMILAR = [
+    *(
+        f"captured/{id}"
+        for id, row in CLIPS.items()
+        if "similarity" in row.experiments and row.dataset != EMBEDDED
+    ),
+    *(f"planted/{id}" for id, recipe in PLANTED.items() if "similarity" in recipe.experiments),
+]
+TASKS = TASKS if SIMILAR else {}
+ADAPTED = [f"{task}{variant}" for task in TASKS for variant in ("", "_without_style")]
+
 
 wildcard_constraints:
+    task="|".join(TASKS) or "none",
     clip="|".join(CLIPS) or "none",
     planted="|".join(PLANTED) or "none",
     synthesis="|".join(SYNTHESES) or "none",
@@ -208,7 +228,14 @@ def motion_files():
     captured += [MOTIONS / "captured" / f"{id}_physical.npz" for id in PHYSICAL]
     captured += [MOTIONS / f"{kind}/{id}.npz" for id in SYNTHESES for kind in ("nio", "warp")]
     captured += [MOTIONS / f"warp/{id}_copied.npz" for id in SYNTHESES]
-    return captured + [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    captured += [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    return captured + [MOTIONS / "adapted" / f"{id}.npz" for id in ADAPTED]
+
+
+def made_motions():
+    """Return the motions of the kinds that are judged against their example."""
+    kinds = SIMILARITY["judge"]["kinds"]
+    return [file for file in motion_files() if file.parent.name in kinds]
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
@@ -223,6 +250,12 @@ TABLES += [
     RESULTS / f"tables/{name}.csv" for name in ("syntheses", "ramp_gait", "solver_comparison")
 ]
 
+SIMILARITY_TABLES = [
+    *("similarity_alignments", "similarity_sets", "leg_subspaces", "leakage", "one_class_svm"),
+    *("discrimination", "dose_response", "dose_points", "adaptations", "style_judgement"),
+]
+TABLES += [RESULTS / f"tables/{name}.csv" for name in SIMILARITY_TABLES if SIMILAR]
+
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {
     figure: [id for id in ids if id in CLIPS] or list(CLIPS)[:4]
@@ -235,6 +268,9 @@ FIGURES += ["force_plates", "plate_moments"] if PLATES else []
 FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else []
 FIGURES += ["syntheses", "warps"] if SYNTHESES else []
 FIGURES += ["solvers"] if COMPARED else []
+FIGURES += ["similarity_features", "leg_subspaces", "leakage", "discrimination"] if SIMILAR else []
+FIGURES += ["dose_response"] if SIMILAR and PLANTED else []
+FIGURES += ["adaptation_triptych", "adaptation_strips"] if TASKS else []
 
 
 def everything():

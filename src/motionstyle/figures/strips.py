@@ -270,6 +270,8 @@ def strip_figure(
         lambda axes, motion, name: stick_strip(
             axes, motion, n, view=view, title=name, forces=forces
         ),
+            axes, motion, n, view=view, title=name, forces=forces
+        ),
     )
     handles = [
         Line2D([], [], color=SIDE_COLOURS[side], linestyle=SIDE_LINES[side], label=label)
