@@ -272,7 +272,6 @@ def strip_figure(
         ),
             axes, motion, n, view=view, title=name, forces=forces
         ),
-    )
     handles = [
         Line2D([], [], color=SIDE_COLOURS[side], linestyle=SIDE_LINES[side], label=label)
         for side, label in (("r", "right"), ("l", "left"), ("", "trunk and head"))
