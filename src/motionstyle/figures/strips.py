@@ -270,8 +270,7 @@ def strip_figure(
         lambda axes, motion, name: stick_strip(
             axes, motion, n, view=view, title=name, forces=forces
         ),
-            axes, motion, n, view=view, title=name, forces=forces
-        ),
+    )
     handles = [
         Line2D([], [], color=SIDE_COLOURS[side], linestyle=SIDE_LINES[side], label=label)
         for side, label in (("r", "right"), ("l", "left"), ("", "trunk and head"))
