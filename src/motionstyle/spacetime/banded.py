@@ -45,18 +45,20 @@ def assemble_hessian(basis: SplineBasis, hessians: Array) -> BandedHessian:
     """Return Σ_t Φ_tᵀ H_t Φ_t of symmetric H (F, 3n, 3n) over (q, q̇, q̈)."""
     frames, wide = hessians.shape[:2]
     n = wide // 3
-    turned = np.ascontiguousarray(basis.weights.swapaxes(1, 2))  # (F, 4, 3)
-    half = turned @ hessians.reshape(frames, 3, n * wide)  # (F, 4, n·3n)
-    half = half.reshape(frames, 4 * n, 3, n).swapaxes(1, 2).reshape(frames, 3, 4 * n * n)
-    whole = (turned @ half).reshape(frames, 4, 4, n, n)  # (F, c', c, a, b)
-    whole = whole.transpose(0, 1, 4, 2, 3).reshape(frames, 4 * n, 4 * n)
+    pairs = basis.weights[:, :, None, :, None] * basis.weights[:, None, :, None, :]
+    pairs = pairs.reshape(frames, 9, 16).swapaxes(1, 2)
+    blocks = hessians.reshape(frames, 3, n, 3, n).transpose(0, 1, 3, 2, 4).reshape(frames, 9, n * n)
+    whole = (pairs @ blocks).reshape(frames, 4, 4, n, n)  # (F, c, c', a, b)
     controls = basis.controls
+    # Columns in store are 8n long; steps of 8n − 1 lay the blocks out as a lower band. Each goes to
+    # its mirror place, the same by symmetry, where the inner loop runs along memory.
     height = 8 * n
     store = np.zeros(height * controls * n)
     step = store.itemsize
+    down, along = step, step * (height - 1)
     for t, first in enumerate(basis.first):
         view = as_strided(
-            store[height * first * n :], (4 * n, 4 * n), (step, step * (height - 1)), writeable=True
+            store[height * first * n :], (4, 4, n, n), (n * along, n * down, along, down)
         )
         view += whole[t]
     band = store.reshape(controls * n, height)[:, : 4 * n].T

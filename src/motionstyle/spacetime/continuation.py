@@ -49,7 +49,7 @@ def solve_spacetime(
     settings = settings or SolverSettings()
     own = problem.settings.sigmoid_gain
     gains = [] if warm else [gain for gain in GAINS if gain < own]
-    trace, seconds = [], 0.0
+    trace, iterations, seconds = [], 0, 0.0
     barrier = WARM_BARRIER if warm else settings.barrier
     for gain in [*gains, own]:
         last = gain == own
@@ -70,9 +70,10 @@ def solve_spacetime(
             replace(t, iteration=len(trace) + k, seconds=seconds + t.seconds)
             for k, t in enumerate(result.trace)
         ]
+        iterations += result.iterations
         seconds += result.seconds
         if result.status == "not a number" or seconds >= settings.seconds:
             break
         controls, coefficients = result.point.controls, result.point.coefficients * FORCE_UNIT
         barrier = WARM_BARRIER
-    return replace(result, iterations=len(trace), seconds=seconds, trace=trace)
+    return replace(result, iterations=iterations, seconds=seconds, trace=trace)

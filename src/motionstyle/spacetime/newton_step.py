@@ -135,13 +135,15 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     """
     more = 1 + delta
     index = np.arange(4 * POINTS)
-    hessian = blocks.curved + more * blocks.gauss
+    hessian = more * blocks.gauss
+    hessian += blocks.curved
     if delta:
         diagonal = np.arange(3 * COUNT)
         hessian[:, diagonal, diagonal] += delta * METRIC
     inner = more * blocks.inner_gauss
     inner[:, index, index] += blocks.inner_diagonal + delta
-    cross = blocks.mixed_curved + more * blocks.mixed_gauss
+    cross = more * blocks.mixed_gauss
+    cross += blocks.mixed_curved
     inverse = np.linalg.inv(inner)
     answer = inverse @ np.swapaxes(cross, 1, 2)
     hessian -= cross @ answer

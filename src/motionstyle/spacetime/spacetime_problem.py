@@ -84,9 +84,11 @@ class Values:
     """The problem at one point.
 
     coordinates, rates, accelerations : (F, 35). root, muscle : Q_0 (F, 6), Q_m (F, 29), N, N·m.
+    passive : Q_p of springs and dampers, (F, 29), N·m.
     residuals : √w·(Q_0, Q_m), (F, 35). foot_residuals : √w_f·(C − target), (F, 24), 0 where free.
     inequalities : rows that should be ≥ 0, (F, R): q − low, high − q, heights − clearance.
-    forces : on the foot points, of contact (F, 8, 3), without shoes. points : (F, 8, 3).
+    forces : of contact on the foot points (F, 8, 3), without shoes; shoe_forces : theirs, N.
+    points : foot points in the world, (F, 8, 3), m.
     """
 
     coordinates: Array
@@ -109,7 +111,16 @@ class Values:
 
 
 class Evaluator:
-    """Evaluates a problem; what does not change between evaluations is kept."""
+    """Evaluates a problem; what does not change between evaluations is kept.
+
+    Attributes
+    ----------
+    basis : of the splines. cone : edges of the friction cones, (F, 8, 4, 3).
+    bearing : coefficients that may push, (F, 32). scale : √w of the residuals, (35,).
+    foot_rows : √w_f times what held points must keep to, (F, 8, 3, 3).
+    limited : coordinates with ranges, and their low and high.
+    row_scale, row_weight : of the inequality rows, (R,). row_active : which count, (F, R).
+    """
 
     def __init__(self, problem: SpacetimeProblem) -> None:
         self.problem = problem
@@ -277,8 +288,7 @@ class Evaluator:
         _force, by_height, by_height2 = self._shoe(values.points)
         push = (pull * feet.normals).sum(axis=-1)
         split = cross.reshape(frames, POINTS, 3, COUNT)
-        rows_of_feet = self.foot_rows * 1.0
-        held = (foot_lift.reshape(frames, POINTS, 1, 3) @ rows_of_feet)[:, :, 0]
+        held = (foot_lift.reshape(frames, POINTS, 1, 3) @ self.foot_rows)[:, :, 0]
         bends = held + (pushes + push * by_height)[..., None] * feet.normals
         bent = self.problem.functions["foot_curvature"](
             values.coordinates, bends.reshape(frames, -1), self.parameters
