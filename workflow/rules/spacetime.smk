@@ -84,6 +84,7 @@ rule synthesise:
         motion=MOTIONS / "nio/{synthesis}.npz",
         sidecar=MOTIONS / "nio/{synthesis}.json",
         report=RESULTS / "syntheses/nio/{synthesis}.json",
+        diagnosis=RESULTS / "diagnosis/nio/{synthesis}.json",
     log:
         LOGS / "synthesise/{synthesis}.log",
     benchmark:

@@ -23,10 +23,14 @@ with job(snakemake.log[0]):
         functions = load_functions(dynamics_functions, Path(inputs.code))
         functions |= load_functions(second_order_functions, Path(inputs.second_order))
         found = synthesise(row, plan, load_style(Path(inputs.style)), functions)
+        if found.motion is None:
+            raise MotionStyleError(f"the solver broke down: {found.report['reason']}")
     except MotionStyleError as error:
         print(f"failed: {error}")
         save_failure(output.motion, row.id, "nio", str(error), example=row.example)
         write_json(output.report, {"status": "failed", "reason": str(error)})
+        write_json(output.diagnosis, {"status": "failed", "reason": str(error)})
     else:
         save_motion(output.motion, found.motion)
         write_json(output.report, {**found.report, "trace": found.trace})
+        write_json(output.diagnosis, found.diagnosis)

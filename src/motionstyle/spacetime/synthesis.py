@@ -15,13 +15,13 @@ from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.continuation import solve_spacetime
+from motionstyle.spacetime.diagnosis import Outcome, checked_solve
 from motionstyle.spacetime.edits import edit_shoes
-from motionstyle.spacetime.foot_constraints import FootConstraints
+from motionstyle.spacetime.outcome import outcome_of
 from motionstyle.spacetime.solver_point import InteriorPointResult, SolverSettings
 from motionstyle.spacetime.spacetime_problem import (
     SpacetimeProblem,
     SpacetimeSettings,
-    Values,
 )
 from motionstyle.spacetime.splines import SplineBasis
 from motionstyle.spacetime.style import Style, initial_style
@@ -39,13 +39,14 @@ USUAL_SHOES = (1e4, 0.01)
 class Synthesis:
     """A motion of kind `nio` and how it was found.
 
-    report : columns of `tables/syntheses.csv` that the solver knows. trace : one record per
-    iteration.
+    motion : None if the solver broke down. report : columns of `tables/syntheses.csv` that the
+    solver knows. trace : one record per iteration. diagnosis : see `spacetime.diagnosis`.
     """
 
-    motion: Motion
+    motion: Motion | None
     report: dict[str, Any]
     trace: list[dict[str, float]]
+    diagnosis: dict[str, Any]
 
 
 def net_torques(
@@ -130,8 +131,21 @@ def synthesise(
     """
     problem = spacetime_problem(row, plan, style, functions, weights)
     controls = problem.basis().fit((start or plan.start).coordinates)
-    result = solve_spacetime(problem, controls, settings=settings, log=log)
+
+    def run() -> Outcome[InteriorPointResult]:
+        return outcome_of(problem, solve_spacetime(problem, controls, settings=settings, log=log))
+
+    result, record, diagnosis = checked_solve(run, log)
+    report = {k: v for k, v in asdict(record).items() if k != "violations"}
+    if result is None:
+        return Synthesis(None, report, [], diagnosis)
     values = result.values
+    root = float((values.residuals[:, :6] ** 2).sum())
+    report |= {
+        "E": values.energy,
+        "root_share_of_E_pct": 100 * root / values.energy if values.energy > 0 else 0.0,
+        "cone_excess_n": plan.feet.cone_excess(values.forces),  # shoes apart
+    }
     motion = replace(
         plan.start,
         id=row.id,
@@ -142,20 +156,7 @@ def synthesise(
         provenance={
             **plan.start.provenance,
             "variant": "synthesised",
-            "solver_status": result.status,
+            "solver_status": record.status,
         },
     )
-    return Synthesis(motion, _report(result, values, plan.feet), [asdict(t) for t in result.trace])
-
-
-def _report(result: InteriorPointResult, values: Values, feet: FootConstraints) -> dict[str, Any]:
-    root = float((values.residuals[:, :6] ** 2).sum())
-    return {
-        "status": result.status,
-        "iterations": result.iterations,
-        "seconds": result.seconds,
-        "E": values.energy,
-        "optimality": result.optimality,
-        "root_share_of_E_pct": 100 * root / values.energy if values.energy > 0 else 0.0,
-        "cone_excess_n": feet.cone_excess(values.forces),  # shoes apart
-    }
+    return Synthesis(motion, report, [asdict(t) for t in result.trace], diagnosis)
