@@ -47,7 +47,7 @@ class TrainingSettings:
     width: float = 0.3
     floor: float = 1e-4
     start_prior: float = 1.0
-    schedule: Schedule = Schedule()
+    schedule: Schedule = Schedule()  # noqa: RUF009 - frozen
 
 
 @dataclass(frozen=True)
