@@ -26,6 +26,9 @@ class Schedule:
     roam_below, settle_below : temperatures at which the second and the third phase begin.
     trim_above, trim_every : transitions and states are trimmed once Z exceeds the first, every
         so many steps.
+    state_cost : after training, a state is removed where the log-likelihood then falls by less than
+        this many times ½ log(frames) per parameter of its Gaussian (1: BIC; 0: never). Trimming alone
+        keeps two states that share one true state, for each is entered.
     tolerance : training stops when the log-posterior changes by less than this share of itself,
         in the third phase at T = 0.
     """
@@ -41,6 +44,7 @@ class Schedule:
     settle_below: float = 0.2
     trim_above: float = 0.5
     trim_every: int = 5
+    state_cost: float = 0.0
     tolerance: float = 1e-6
 
     @staticmethod

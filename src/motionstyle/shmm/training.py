@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Start = Literal["spread", "random"]
 NEVER_STARTS = 1e-6
 LEAST_FRAMES = 1.0
+MERGE_STEPS, MERGE_TRIES = 4, 5
 
 
 @dataclass(frozen=True)
@@ -197,6 +198,62 @@ def train(
     return StyleMachine(
         generic, specifics, tuple(packed.split(found.occupancy)), own, tuple(course)
     )
+
+
+def _merge(
+    packed: Sequences,
+    member: Array,
+    own: NDArray[np.int64],
+    generic: HiddenMarkovModel,
+    specifics: HiddenMarkovModel,
+    floor: Array,
+    settings: TrainingSettings,
+) -> tuple[HiddenMarkovModel, HiddenMarkovModel]:
+    """Remove states while that is worth the likelihood it costs; `Schedule.state_cost`.
+
+    Tried in the order of the distance to the nearest other state, each after a few EM steps.
+    """
+    schedule = settings.schedule
+    d = generic.dimensions
+    parameters = (d + d * (d + 1) / 2) * len(specifics.means)
+    cost = schedule.state_cost * 0.5 * np.log(packed.total) * parameters
+    strength, holding = schedule.entropy, schedule.holding_final
+
+    def refined(
+        model: HiddenMarkovModel, ones: HiddenMarkovModel
+    ) -> tuple[float, HiddenMarkovModel, HiddenMarkovModel]:
+        for _ in range(MERGE_STEPS):
+            found = expectations(ones[own], packed)
+            model, ones = _m_step(
+                found, packed, member, model, ones, floor, settings, strength, holding
+            )
+        return float(expectations(ones[own], packed).log_likelihood.sum()), model, ones
+
+    value, generic, specifics = refined(generic, specifics)
+    removed = True
+    while removed and generic.states > 2:
+        removed = False
+        gaps = np.linalg.norm(generic.means[:, None] - generic.means[None], axis=-1)
+        np.fill_diagonal(gaps, np.inf)
+        for state in np.argsort(gaps.min(axis=1), kind="stable")[:MERGE_TRIES]:
+            alive = np.arange(generic.states) != state
+            try:
+                tried = refined(_bridged(generic, state, alive), _bridged(specifics, state, alive))
+            except MotionStyleError:
+                continue
+            if tried[0] >= value - cost:
+                value, generic, specifics = tried
+                removed = True
+                break
+    return generic, specifics
+
+
+def _bridged(model: HiddenMarkovModel, state: int, alive: NDArray[np.bool_]) -> HiddenMarkovModel:
+    """Return the model without a state, whose predecessors lead on to its successors."""
+    p = model.transitions
+    onward = normalised(p[..., state, :] * alive)
+    through = p[..., :, state][..., :, None] * onward[..., None, :]
+    return model.with_transitions(p + through).keep(alive)
 
 
 def _from_occupancy(occupancy: Sequence[Array], packed: Sequences) -> Expectations:

@@ -6,6 +6,7 @@ each cycle of walking and of running. Contacts are not used: synthesised feet ma
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +68,7 @@ def mean_cycle(*motions: Motion) -> MeanCycle:
     for motion in motions:
         channels, starts = pose_channels(motion), cycle_starts(motion)
         frames = np.arange(motion.frames)
-        for a, b in zip(starts[:-1], starts[1:], strict=True):
+        for a, b in itertools.pairwise(starts):
             if b - a > LONGEST_CYCLE_S * motion.rate_hz:
                 continue
             at = np.linspace(a, b, PHASES, endpoint=False)

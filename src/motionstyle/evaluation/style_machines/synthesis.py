@@ -103,7 +103,7 @@ def hip_roll_deg(motion: Motion) -> float:
 
 
 def step_width_cm(motion: Motion) -> float:
-    """Return the median step width, cm; from the ankles at mid-stance where contacts are missing."""
+    """Return the median step width, cm; from low feet where contacts are missing."""
     if len(foot_stances(motion)) >= 3:
         widths = step_widths(motion)
         if len(widths):
