@@ -20,7 +20,7 @@ ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
 PATH_KEYS = (
     *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
-    *("planted", "normative"),
+    *("planted", "normative", "style_machines"),
 )
 
 
@@ -140,13 +140,20 @@ def motion_files():
     """Return the files of every motion of this run."""
     captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
     captured += [MOTIONS / "captured" / f"{id}_physical.npz" for id in PHYSICAL]
-    return captured + [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    planted = [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    synthesised = [file for job in SHMM_MADE for file in shmm_motions(job)]
+    return captured + planted + synthesised
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
 TABLES = [
     RESULTS / f"tables/{name}.csv"
-    for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
+    for name in (
+        *("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates"),
+        # style machines
+        *("explained_variance", "style_dof", "analogies", "held_out", "dance_model", "novice"),
+        *("path_map", "shmm_figure_checks", "shmm_sensitivity", "shmm_twin", "shmm_syntheses"),
+    )
 ]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.

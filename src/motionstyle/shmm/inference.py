@@ -158,11 +158,12 @@ def expectations_of(
     log_likelihood = logs.sum(axis=1)
     occupancy = alpha * beta
     total = occupancy.sum(axis=-1, keepdims=True)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # where α and β hardly overlap the products leave floating point; those sequences are redone
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         occupancy = np.where(inside, occupancy / total, 0.0)
         # what comes after a transition into i at t, over the total weight of frame t
         after = np.where(inside, b * beta / (scale[..., None] * total), 0.0)[:, 1:]
-    counts = transitions * (np.swapaxes(alpha[:, :-1], 1, 2) @ after)
+        counts = transitions * (np.swapaxes(alpha[:, :-1], 1, 2) @ after)
     each = np.broadcast_to(transitions, counts.shape)
     bad = ~(np.isfinite(log_likelihood) & np.isfinite(occupancy).all(axis=(1, 2)))
     bad |= ~np.isfinite(counts).all(axis=(1, 2))

@@ -172,16 +172,22 @@ class StyledPoses:
     dwell: Array
 
 
+def styled_means(machine: PoseMachine, weights: Array) -> Array:
+    """Return the state means (N, 2D) of a style given as weights of the specific models, (R,)."""
+    w = np.asarray(weights, dtype=float)
+    if w.shape != (len(machine.means),):
+        raise MotionStyleError(f"a style needs {len(machine.means)} weights, found {w.shape}")
+    return machine.generic.means + np.tensordot(w, machine.means - machine.generic.means, 1)
+
+
 def styled_poses(machine: PoseMachine, weights: Array) -> StyledPoses:
     """Return pose states of a style given as weights of the specific models, (R,).
 
     generic + Σ w_r (specific_r − generic), in means, signed roots of covariances, and dwell.
     """
     w = np.asarray(weights, dtype=float)
-    if w.shape != (len(machine.means),):
-        raise MotionStyleError(f"a style needs {len(machine.means)} weights, found {w.shape}")
+    means = styled_means(machine, w)
     generic = machine.generic
-    means = generic.means + np.tensordot(w, machine.means - generic.means, 1)
     origin = signed_roots(generic.covariances)
     roots = origin + np.tensordot(w, machine.roots - origin, 1)
     floor = 0.05 * np.diagonal(generic.covariances, axis1=1, axis2=2).min(axis=0) + 1e-9

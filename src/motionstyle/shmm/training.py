@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.cluster import kmeans_plusplus
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.shmm.gaussians import divergences, entropies, estimate, moments
@@ -22,7 +23,7 @@ from motionstyle.shmm.multinomial import entropic_rows, row_entropies, trimmed
 from motionstyle.shmm.schedule import Schedule
 
 Array = NDArray[np.float64]
-Start = Literal["spread", "random"]
+Start = Literal["spread", "random", "seeded"]
 NEVER_STARTS = 1e-6
 LEAST_FRAMES = 1.0
 MERGE_STEPS, MERGE_TRIES = 4, 5
@@ -34,7 +35,8 @@ class TrainingSettings:
 
     Attributes
     ----------
-    states : N at the start. start : Gaussians centred on evenly spread or on random frames.
+    states : N at the start. start : Gaussians centred on evenly spread frames, on random ones, or
+        on frames that a k-means++ seeding draws far from each other.
     seed : of random starts. width : initial covariances as a share of the data's.
     floor : least eigenvalue of a covariance as a share of each feature's variance.
     start_prior : weight, in sequences, of the states' overall occupancy in the start
@@ -93,7 +95,7 @@ def initial_model(sequences: Sequences, settings: TrainingSettings) -> HiddenMar
     """Return the start of training (style_machines.md A2.1).
 
     Transitions decay with the distance to the next states of a circle; Gaussians sit on evenly
-    spread frames of the longest sequence, or on random frames of all.
+    spread frames of the longest sequence, or on frames drawn from all.
 
     Raises
     ------
@@ -112,6 +114,8 @@ def initial_model(sequences: Sequences, settings: TrainingSettings) -> HiddenMar
         )
     if settings.start == "spread":
         means = frames[np.linspace(0, len(frames) - 1, n).round().astype(int)]
+    elif settings.start == "seeded":
+        means = kmeans_plusplus(everything, n, random_state=settings.seed)[0]
     else:
         rng = np.random.default_rng(settings.seed)
         means = everything[np.sort(rng.choice(len(everything), n, replace=False))]
@@ -194,6 +198,8 @@ def train(
         )
         if strength > schedule.trim_above and (step + 1) % schedule.trim_every == 0:
             generic, specifics = _trim(found, packed, own, generic, specifics, strength)
+    if schedule.state_cost > 0:
+        generic, specifics = _merge(packed, member, own, generic, specifics, floor, settings)
     found = expectations(specifics[own], packed)
     return StyleMachine(
         generic, specifics, tuple(packed.split(found.occupancy)), own, tuple(course)

@@ -29,6 +29,7 @@ from motionstyle.shmm.model import count_parameters
 from motionstyle.shmm.poses import (
     StyledPoses,
     path_occupancy,
+    styled_means,
     styled_poses,
     synthesise,
 )
@@ -127,15 +128,14 @@ def recognised(
     path = occupancy.argmax(axis=1)
     errors = {}
     for name, w in styles.items():
-        goal = styled_poses(machine.poses, w).states.means[path][:, joints]
+        goal = styled_means(machine.poses, w)[path][:, joints]
         errors[name] = float(((channels[: len(path), joints] - goal) ** 2).mean())
     return min(errors, key=lambda k: errors[k]) == asked
 
 
 def _styled(
-    machine: MotionMachine, states: Sequence[int], weights: Array, id: str
+    machine: MotionMachine, states: Sequence[int], poses: StyledPoses, id: str
 ) -> tuple[Motion, Array]:
-    poses: StyledPoses = styled_poses(machine.poses, weights)
     occupancy = path_occupancy(states, np.maximum(poses.dwell, 1.0))
     return motion_from(id, synthesise(machine.poses, occupancy, poses), machine), occupancy
 
@@ -150,6 +150,7 @@ def dance_syntheses(
     transitions = machine.machine.generic.transitions
     paths = [gamma.argmax(axis=1) for gamma in machine.machine.occupancy]
     styles = dance_styles(machine)
+    posed = {name: styled_poses(machine.poses, w) for name, w in styles.items()}
     choreography = moves_of(paths[0])[:STAYS_IN_STYLE]
     moves = primitives(paths, STAYS_OF_MOVE, MOVES)
     while len(moves) < MOVES:  # short dances repeat little: cut the first one into pieces
@@ -162,7 +163,7 @@ def dance_syntheses(
     found: list[tuple[Motion, dict[str, object]]] = []
 
     def add(name: str, states: Sequence[int], style: str, experiment: str, content: str) -> None:
-        motion, occupancy = _styled(machine, states, styles[style], f"{prefix}-{name}")
+        motion, occupancy = _styled(machine, states, posed[style], f"{prefix}-{name}")
         known = recognised(machine, motion, occupancy, styles, style)
         done = finished(motion, thresholds)
         done = replace(
@@ -274,15 +275,14 @@ def novice_rows(
     packed = pack([machine.features.features(m) for m in machine.motions])
     floor = floor_of(packed, MachineSettings().training())
     seeds = faults["seeds"]
+    poses = styled_poses(machine.poses, np.eye(len(machine.names))[own])
     options = {k: faults[k] for k in ("noise_deg", "tempo", "swaps")}
     for seed in seeds:  # type: ignore[union-attr]
         novice, source = simulated_novice(original, seed=int(seed), **options)  # type: ignore[arg-type]
         found = analyse(
             [machine.features.features(novice)], machine.machine, machine.space, floor=floor
         )
-        occupancy = found.occupancy[0]
-        poses = styled_poses(machine.poses, np.eye(len(machine.names))[own])
-        channels = synthesise(machine.poses, occupancy, poses)
+        channels = synthesise(machine.poses, found.occupancy[0], poses)
         improved = motion_from(f"{novice.id}-improved", channels, machine, simulated_novice=True)
         before = expectations(model, pack([machine.features.features(novice)]))
         after = expectations(model, pack([machine.features.features(improved)]))

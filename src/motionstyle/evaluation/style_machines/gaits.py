@@ -24,8 +24,8 @@ from motionstyle.shmm.style_space import style_space
 
 Array = NDArray[np.float64]
 EXPLAINED_COLUMNS = (
-    *("config", "data", "set", "draw", "prior", "blocks", "models", "states", "dof"),
-    *("cumulative_share", "mirrored"),
+    *("config", "data", "set", "draw", "prior", "models", "states", "dof"),
+    *("cumulative_share", "cumulative_share_unscaled"),
 )
 DOF_COLUMNS = (
     "config",
@@ -51,23 +51,25 @@ def free_of_prior(settings: MachineSettings) -> MachineSettings:
 
 def explained_rows(machine: MotionMachine, facts: Mapping[str, object]) -> list[dict[str, object]]:
     """Return the cumulative explained variance of the first style degrees of freedom."""
-    rows = []
-    for blocks, scaled in (("scaled", True), ("unscaled", False)):
-        space = style_space(
-            machine.machine.generic, machine.machine.specifics, 1, scale_blocks=scaled
+    shares = [
+        np.cumsum(
+            style_space(
+                machine.machine.generic, machine.machine.specifics, 1, scale_blocks=scaled
+            ).shares
         )
-        for dof, share in enumerate(np.cumsum(space.shares)[:SHOWN_DOF], start=1):
-            rows.append(
-                {
-                    **facts,
-                    "blocks": blocks,
-                    "models": len(machine.names),
-                    "states": machine.machine.states,
-                    "dof": dof,
-                    "cumulative_share": float(share),
-                }
-            )
-    return rows
+        for scaled in (True, False)
+    ]
+    return [
+        {
+            **facts,
+            "models": len(machine.names),
+            "states": machine.machine.states,
+            "dof": dof + 1,
+            "cumulative_share": float(shares[0][dof]),
+            "cumulative_share_unscaled": float(shares[1][dof]),
+        }
+        for dof in range(min(SHOWN_DOF, len(shares[0])))
+    ]
 
 
 def explained_variance(

@@ -71,10 +71,10 @@ def twin_row(
     start = round(START_FACTOR * states)
     training = TrainingSettings(
         start,
-        start="random",
+        start="seeded",
         seed=seed,
         schedule=Schedule(
-            start_temperature=5.0, steps=100, holding_final=0.05, trim_every=3, state_cost=1.0
+            start_temperature=20.0, steps=120, holding_final=0.05, trim_every=3, state_cost=1.0
         ),
     )
     found = train(sequences, training)
