@@ -164,6 +164,7 @@ SHOWN = {
 FIGURES = ["body", "strips", "gait", "markers"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates"] if PLATES else []
+# What style machines draw is added in their rules.
 
 
 def everything():

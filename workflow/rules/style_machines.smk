@@ -277,3 +277,105 @@ rule shmm_benchmark:
         plan=shmm_plan("dance"),
     script:
         "../scripts/shmm_benchmark.py"
+
+
+# Figures from tables and arrays.
+SHMM_FIGURES = [
+    "shmm_" + name
+    for name in (
+        *("models", "priors", "dof", "dance", "graphs", "annealing", "axes", "analogies"),
+        *("held_out", "driving", "phases", "twin", "novice"),
+    )
+]
+# Strips of synthesised motions: which ones, the view, and how many stick figures.
+SHMM_STRIPS = {
+    "shmm_teaser": ([f"dance-choreography-{k}" for k in range(5)], "oblique", 9),
+    "shmm_gaits": (
+        [f"gait-{a}-{b}" for a in ("strut", "cat") for b in ("walk", "run", "style", "x")],
+        "side",
+        None,
+    ),
+    "shmm_extremes": (
+        [f"gait-dof{d}-{end}" for d in (1, 2, 3) for end in ("minus", "plus")]
+        + [f"gait-{a}-{b}" for a in ("strut", "cat") for b in ("interpolated", "extrapolated")],
+        "side",
+        None,
+    ),
+    "shmm_choreography": (
+        [f"dance-move{m}-{k}" for m in range(4) for k in range(5)],
+        "oblique",
+        7,
+    ),
+    "shmm_walks": ([*(f"dance-walk-{k}" for k in range(3)), "dance-pasted"], "oblique", 9),
+    "shmm_novice_strip": (
+        [f"dance-novice-{k}" for k in ("original", "novice", "improved")],
+        "oblique",
+        9,
+    ),
+    "shmm_driven": (
+        [f"driven-{k}" for k in ("truth", "path_map", "path_map_restyled")],
+        "oblique",
+        9,
+    ),
+}
+
+
+def shmm_shown(name):
+    """Return the motions of a strip that this run makes."""
+    made = {id for ids in SHMM_MADE.values() for id in ids}
+    return [MOTIONS / f"shmm/{id}.npz" for id in SHMM_STRIPS[name][0] if id in made]
+
+
+FIGURES += SHMM_FIGURES + [name for name in SHMM_STRIPS if shmm_shown(name)]
+
+
+rule shmm_figures:
+    input:
+        tables=[
+            RESULTS / f"tables/{name}.csv"
+            for name in (
+                *("shmm_figure_checks", "dance_model", "explained_variance", "style_dof"),
+                *("analogies", "held_out", "path_map", "shmm_twin", "novice"),
+            )
+        ],
+        gaits=SHMM / "gaits.npz",
+        dances=SHMM / "dances.npz",
+        driving=SHMM / "driving.npz",
+        checks=SHMM / "checks.npz",
+    output:
+        svg=[RESULTS / f"figures/{name}.svg" for name in SHMM_FIGURES],
+        png=[RESULTS / f"figures/{name}.png" for name in SHMM_FIGURES],
+    log:
+        LOGS / "figures/shmm.log",
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    params:
+        library=library("body", "motion", "shmm", "evaluation", "figures"),
+    script:
+        "../scripts/shmm_figures.py"
+
+
+rule shmm_strips:
+    input:
+        motions=lambda wildcards: shmm_shown(wildcards.strip),
+    output:
+        svg=RESULTS / "figures/{strip}.svg",
+        png=RESULTS / "figures/{strip}.png",
+    log:
+        LOGS / "figures/{strip}.log",
+    wildcard_constraints:
+        strip="|".join(SHMM_STRIPS),
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=1500,
+    params:
+        library=library("body", "motion", "evaluation", "figures"),
+        view=lambda wildcards: SHMM_STRIPS[wildcards.strip][1],
+        count=lambda wildcards: SHMM_STRIPS[wildcards.strip][2],
+    script:
+        "../scripts/shmm_strips.py"

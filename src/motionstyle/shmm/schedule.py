@@ -26,9 +26,9 @@ class Schedule:
     roam_below, settle_below : temperatures at which the second and the third phase begin.
     trim_above, trim_every : transitions and states are trimmed once Z exceeds the first, every
         so many steps.
-    state_cost : after training, a state is removed where the log-likelihood then falls by less than
-        this many times ½ log(frames) per parameter of its Gaussian (1: BIC, 0: never). Trimming
-        alone keeps two states that share one true state, for each is entered.
+    state_cost : after training, a state is removed where the log-likelihood then falls by less
+        than this many times ½ log(frames) per free parameter of its Gaussians (1: BIC, 0: never).
+        Trimming alone keeps two states that share one true state, for each is entered.
     tolerance : training stops when the log-posterior changes by less than this share of itself,
         in the third phase at T = 0.
     """

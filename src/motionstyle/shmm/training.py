@@ -221,7 +221,9 @@ def _merge(
     """
     schedule = settings.schedule
     d = generic.dimensions
-    parameters = (d + d * (d + 1) / 2) * len(specifics.means)
+    # a specific model follows its own data with the share 1/(1 + ζ′) and the generic one otherwise
+    free = 1.0 / (1.0 + schedule.holding_final)
+    parameters = (d + d * (d + 1) / 2) * (free * len(specifics.means) + 1.0 - free)
     cost = schedule.state_cost * 0.5 * np.log(packed.total) * parameters
     strength, holding = schedule.entropy, schedule.holding_final
 

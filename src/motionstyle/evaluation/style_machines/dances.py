@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.style_machines.synthesis import (
     finished,
     synthesis_row,
@@ -180,9 +182,19 @@ def dance_syntheses(
     walk = random_walk(transitions, start, WALK_STAYS, seed)
     for k, style in enumerate(list(styles)[-3:]):
         add(f"walk-{k}", walk, style, "sm-E6", "random walk")
-    pasted = joined(transitions, [moves[m] for m in (0, 1)])
+    pasted = _pasted(transitions, moves)
     add("pasted", pasted, next(iter(styles)), "sm-E6", "cut and paste")
     return found
+
+
+def _pasted(transitions: Array, moves: Sequence[tuple[int, ...]]) -> list[int]:
+    """Return two moves joined by a path of the state graph, or one move where none are joined."""
+    for first, second in itertools.permutations(moves, 2):
+        try:
+            return joined(transitions, [first, second])
+        except MotionStyleError as error:
+            print(error)
+    return list(moves[0])
 
 
 def dance_ids(prefix: str, models: int) -> list[str]:
