@@ -148,12 +148,7 @@ def motion_files():
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
 TABLES = [
     RESULTS / f"tables/{name}.csv"
-    for name in (
-        *("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates"),
-        # style machines
-        *("explained_variance", "style_dof", "analogies", "held_out", "dance_model", "novice"),
-        *("path_map", "shmm_figure_checks", "shmm_sensitivity", "shmm_twin", "shmm_syntheses"),
-    )
+    for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
 ]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
@@ -164,7 +159,7 @@ SHOWN = {
 FIGURES = ["body", "strips", "gait", "markers"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates"] if PLATES else []
-# What style machines draw is added in their rules.
+# The tables and figures of style machines are added in their rules.
 
 
 def everything():

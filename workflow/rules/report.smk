@@ -147,9 +147,7 @@ rule publish:
             for name in (
                 *("body", "clips", "gait_angles", "gait", "claims"),
                 *("physical", "force_plates"),
-                *("explained_variance", "style_dof", "analogies", "held_out", "dance_model"),
-                *("novice", "path_map", "shmm_figure_checks", "shmm_sensitivity"),
-                *("shmm_twin", "shmm_syntheses"),
+                *SHMM_TABLES,
             )
         ],
         figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],

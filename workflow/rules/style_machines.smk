@@ -326,7 +326,15 @@ def shmm_shown(name):
     return [MOTIONS / f"shmm/{id}.npz" for id in SHMM_STRIPS[name][0] if id in made]
 
 
-FIGURES += SHMM_FIGURES + [name for name in SHMM_STRIPS if shmm_shown(name)]
+# A sheet without any motion of these experiments gets none of their tables and figures.
+SHMM_TABLES = []
+if any(SHMM_MADE.values()) or SHMM_PLAN["analogies"] or SHMM_PLAN["held_out"]:
+    SHMM_TABLES = [
+        *("explained_variance", "style_dof", "analogies", "held_out", "dance_model", "novice"),
+        *("path_map", "shmm_figure_checks", "shmm_sensitivity", "shmm_twin", "shmm_syntheses"),
+    ]
+    TABLES += [RESULTS / f"tables/{name}.csv" for name in SHMM_TABLES]
+    FIGURES += SHMM_FIGURES + [name for name in SHMM_STRIPS if shmm_shown(name)]
 
 
 rule shmm_figures:

@@ -50,7 +50,8 @@ def joined(transitions: Array, pieces: Sequence[Sequence[int]]) -> list[int]:
         If no path leads from one piece to the next.
     """
     graph = leaving(transitions)
-    costs = np.where(graph > 0, -np.log(np.where(graph > 0, graph, 1.0)) + 1e-9, 0.0)
+    # SciPy takes what is below 1e-8 for no arc at all
+    costs = np.where(graph > 0, -np.log(np.where(graph > 0, graph, 1.0)) + 1e-6, 0.0)
     _, before = shortest_path(costs, return_predecessors=True)
     result = list(pieces[0])
     for piece in pieces[1:]:
