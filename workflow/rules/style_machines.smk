@@ -384,6 +384,6 @@ rule shmm_strips:
     params:
         library=library("body", "motion", "evaluation", "figures"),
         view=lambda wildcards: SHMM_STRIPS[wildcards.strip][1],
-        count=lambda wildcards: SHMM_STRIPS[wildcards.strip][2],
+        number=lambda wildcards: SHMM_STRIPS[wildcards.strip][2],
     script:
         "../scripts/shmm_strips.py"

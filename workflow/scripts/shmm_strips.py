@@ -14,7 +14,7 @@ with job(snakemake.log[0]):
     ]
     view = snakemake.params.view
     figure = (
-        strip_figure(motions, titles, view=view, n=snakemake.params.count)
+        strip_figure(motions, titles, view=view, n=snakemake.params.number)
         if motions
         else blank_figure("no motion to show")
     )

@@ -30,6 +30,7 @@ ROOT_CHANNELS = ("height_m", "tilt_x", "tilt_y", "tilt_z", "forward_mps", "right
 CHANNELS = (*COORDINATES[JOINT_COORDINATES], *ROOT_CHANNELS)
 JOINTS_COUNT = len(CHANNELS) - len(ROOT_CHANNELS)
 LEAST_SCALE = 1e-3  # m/rad; a coordinate that moves nothing still counts a little
+STILL_M = 1e-9
 SCALE_FRAMES = 40  # per motion, enough for a mean over poses
 
 
@@ -99,7 +100,7 @@ def learn_features(motions: Sequence[Motion], dimensions: int, *, own_mean: bool
         rows = [s - mean for s in scaled]
     centred = np.concatenate(rows)
     _, sizes, directions = np.linalg.svd(centred, full_matrices=False)
-    live = int((sizes > 1e-9 * max(sizes[0], 1e-12)).sum())
+    live = int((sizes > max(1e-9 * sizes[0], STILL_M)).sum())
     if live < dimensions:
         raise MotionStyleError(
             f"{dimensions} feature dimensions are asked for, but the joints of "

@@ -37,6 +37,7 @@ class MachineSettings:
     ----------
     rate_hz : all motions are brought to it. longest_s : longer ones are cut to their middle.
     dimensions : d of the features. own_mean : see `FeatureSpace`. style_dof : S, at most R.
+    block_weights : of means, covariances and dwell times in the style space.
     hint_dimensions : of the low-dimensional model whose occupancies start the training; 0: none.
     """
 
@@ -44,6 +45,7 @@ class MachineSettings:
     dimensions: int = 8
     own_mean: bool = True
     style_dof: int = 3
+    block_weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
     rate_hz: float = 60.0
     longest_s: float = 3.5
     hint_dimensions: int = 2
@@ -58,6 +60,8 @@ class MachineSettings:
         plain = dict(values)
         schedule = Schedule.from_config(plain.pop("schedule", {}))
         poses = RemapSettings(**plain.pop("remap", {}))
+        if "block_weights" in plain:
+            plain["block_weights"] = tuple(plain["block_weights"])
         return MachineSettings(**plain, schedule=schedule, remap=poses)
 
     def training(self) -> TrainingSettings:
@@ -145,7 +149,9 @@ def learn_machine(
     channels = [pose_channels(m) for m in ready]
     poses = remap(channels, machine.occupancy, machine.owners, settings.remap)
     dof = min(settings.style_dof, len(order))
-    styles = style_space(machine.generic, machine.specifics, dof)
+    styles = style_space(
+        machine.generic, machine.specifics, dof, block_weights=settings.block_weights
+    )
     body = mean_body(ready)
     return MotionMachine(order, tuple(ready), space, machine, poses, styles, body, settings.rate_hz)
 

@@ -91,6 +91,7 @@ def style_space(
     dof: int,
     *,
     scale_blocks: bool = True,
+    block_weights: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> StyleSpace:
     """Return the principal directions of the specific models about the generic one.
 
@@ -99,6 +100,7 @@ def style_space(
     dof : S, number of directions kept.
     scale_blocks : bring the blocks of means, covariances and dwell times, whose units differ, to
         equal sums of squares; otherwise they enter as they are.
+    block_weights : factors on the blocks after that, each more than 0.
 
     Raises
     ------
@@ -114,9 +116,9 @@ def style_space(
             "config/style_machines.yaml), or add clips"
         )
     scales = []
-    for mine, base in zip(own, origin, strict=True):
+    for mine, base, weight in zip(own, origin, block_weights, strict=True):
         size = float(np.sqrt(((mine - base) ** 2).sum()))
-        scales.append(1.0 / size if scale_blocks and size > 1e-12 else 1.0)
+        scales.append(weight * (1.0 / size if scale_blocks and size > 1e-12 else 1.0))
     rows = np.concatenate([s * m for s, m in zip(scales, own, strict=True)], axis=1)
     base = np.concatenate([s * b for s, b in zip(scales, origin, strict=True)], axis=1)[0]
     _, sizes, directions = np.linalg.svd(rows - base, full_matrices=False)

@@ -49,6 +49,7 @@ NOVICE_COLUMNS = (
     *("jerk_ratio", "loglik_gain_nat_per_frame", "error_to_original_ratio"),
     *("novice_error_deg", "improved_error_deg", "style_shift"),
 )
+STYLES = 5
 STAYS_IN_STYLE = 60  # of the choreography of the teaser
 MOVES, STAYS_OF_MOVE = 4, 9
 WALK_STAYS = 70
@@ -106,10 +107,15 @@ def dance_styles(machine: MotionMachine) -> dict[str, Array]:
     own = np.eye(count)
     styles = {machine.names[r]: own[r] for r in range(min(count, 4))}
     if count >= 2:
-        a, b = machine.names[0], machine.names[1]
-        styles[f"1.5 {a} - 0.5 {b}"] = EXTRAPOLATED[0] * own[0] + EXTRAPOLATED[1] * own[1]
-        if len(styles) < 5:
-            styles[f"0.5 {a} + 0.5 {machine.names[-1]}"] = 0.5 * own[0] + 0.5 * own[-1]
+        (a, b), last = machine.names[:2], machine.names[-1]
+        mixtures = {
+            f"1.5 {a} - 0.5 {b}": EXTRAPOLATED[0] * own[0] + EXTRAPOLATED[1] * own[1],
+            f"0.5 {a} + 0.5 {last}": 0.5 * own[0] + 0.5 * own[-1],
+            f"1.5 {last} - 0.5 {a}": EXTRAPOLATED[0] * own[-1] + EXTRAPOLATED[1] * own[0],
+        }
+        for name, weights in mixtures.items():
+            if len(styles) < STYLES:
+                styles[name] = weights
     return styles
 
 
@@ -199,7 +205,7 @@ def _pasted(transitions: Array, moves: Sequence[tuple[int, ...]]) -> list[int]:
 
 def dance_ids(prefix: str, models: int) -> list[str]:
     """Return the ids of `dance_syntheses` for a set of R models, known before they are made."""
-    styles = 5 if models >= 2 else 1
+    styles = STYLES if models >= 2 else 1
     names = []
     for k in range(styles):
         names += [f"choreography-{k}", *(f"move{m}-{k}" for m in range(MOVES))]

@@ -27,7 +27,7 @@ SYNTHESIS_COLUMNS = (
     *("skate_mm", "skate_after_cleanup_mm", "peak_acceleration_ratio"),
     *("joint_range_violation_pct", "style_recognised"),
 )
-STANDING_M = 0.03
+STANDING_M = 0.015
 RANGE_MARGIN_DEG = 5.0
 
 
@@ -50,7 +50,7 @@ def finished(motion: Motion, thresholds: StanceThresholds) -> Motion:
 def skate_mm(motion: Motion) -> float:
     """Return how far a low foot slides: median over stretches of the rms about their mean, mm.
 
-    A stretch is when the lowest point of a foot is below 3 cm, whatever its speed; contacts that
+    A stretch is when the lowest point of a foot is below 1.5 cm, whatever its speed; contacts that
     are found by speed would hide sliding.
     """
     points = contact_points(motion.body, motion.pose())
