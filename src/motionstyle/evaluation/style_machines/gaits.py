@@ -25,7 +25,7 @@ from motionstyle.shmm.style_space import style_space
 Array = NDArray[np.float64]
 EXPLAINED_COLUMNS = (
     *("config", "data", "set", "draw", "prior", "models", "states", "dof"),
-    *("cumulative_share", "cumulative_share_unscaled"),
+    *("cumulative_share", "cumulative_share_unscaled", "cumulative_share_means"),
 )
 DOF_COLUMNS = (
     "config",
@@ -40,6 +40,7 @@ DOF_COLUMNS = (
 )
 QUANTITIES = ("trunk_pitch_deg", "speed_mps", "step_width_cm", "hip_roll_deg", "arm_swing_deg")
 SHOWN_DOF = 8
+NEGLIGIBLE = 1e-9
 AXIS_STEP = 2.0  # standard deviations of the models' coordinates
 
 
@@ -50,25 +51,27 @@ def free_of_prior(settings: MachineSettings) -> MachineSettings:
 
 
 def explained_rows(machine: MotionMachine, facts: Mapping[str, object]) -> list[dict[str, object]]:
-    """Return the cumulative explained variance of the first style degrees of freedom."""
-    shares = [
-        np.cumsum(
-            style_space(
-                machine.machine.generic, machine.machine.specifics, 1, scale_blocks=scaled
-            ).shares
-        )
-        for scaled in (True, False)
-    ]
+    """Return the cumulative explained variance of the first style degrees of freedom.
+
+    With means, covariances and dwell times at equal weight, which claims are judged on; unscaled;
+    and of the means alone.
+    """
+    models = machine.machine.generic, machine.machine.specifics
+    kinds = {
+        "cumulative_share": {},
+        "cumulative_share_unscaled": {"scale_blocks": False},
+        "cumulative_share_means": {"block_weights": (1.0, NEGLIGIBLE, NEGLIGIBLE)},
+    }
+    shares = {name: np.cumsum(style_space(*models, 1, **how).shares) for name, how in kinds.items()}
     return [
         {
             **facts,
             "models": len(machine.names),
             "states": machine.machine.states,
             "dof": dof + 1,
-            "cumulative_share": float(shares[0][dof]),
-            "cumulative_share_unscaled": float(shares[1][dof]),
+            **{name: float(values[dof]) for name, values in shares.items()},
         }
-        for dof in range(min(SHOWN_DOF, len(shares[0])))
+        for dof in range(min(SHOWN_DOF, len(machine.names)))
     ]
 
 
