@@ -253,7 +253,7 @@ def graphs_figure() -> Figure:
                 )
                 sign = {0: "{t-1}", 1: "t", 2: "{t+1}"}[t]
                 text = f"${letter}$" if letter == "v" else f"${letter}_{sign}$"
-                axes.text(t, y, text, ha="center", va="center", zorder=3)
+                axes.text(t, y, text, ha="center", va="center", zorder=3, fontsize=6)
         for t in range(3):
             pairs = [((t, 1.0), (t, 0.0))]
             if t < 2:
@@ -299,11 +299,12 @@ def annealing_figure(arrays: Arrays) -> Figure:
         right.plot([k - 0.2, k + 0.2], [np.median(values)] * 2, color="black", linewidth=1)
         right.text(
             k,
-            float(values.max()),
-            f" range {np.ptp(values):.2f}",
+            1.0,
+            f"range {np.ptp(values):.2f}",
+            transform=right.get_xaxis_transform(),
             fontsize=SMALL_PT,
-            va="bottom",
             ha="center",
+            va="bottom",
         )
     right.set_xticks([0, 1], ["annealed", "plain"])
     right.set_xlim(-0.6, 1.6)
@@ -415,8 +416,16 @@ def held_out_figure(table: pd.DataFrame) -> Figure:
         wins = float((own > ordinary).mean())
         label = f"{method.replace('_', '-')}: better in {100 * wins:.0f} %"
         left.plot(ordinary, own, "o", color=SERIES[k], markersize=3, label=label)
-    ends = [float(np.nanquantile(wide.to_numpy(dtype=float), q)) for q in (0.02, 1)]
+    low = float(np.nanmin(wide.to_numpy(dtype=float)))
+    ends = [min(2 * low, -10.0), 100.0]
     left.plot(ends, ends, color=GROUND, linewidth=0.8)
+    for axis in (left.set_xscale, left.set_yscale):
+        axis("symlog", linthresh=10.0)
+    ticks = [-(10.0**k) for k in (5, 3, 1)] + [0.0, 10.0]
+    ticks = [t for t in ticks if t >= ends[0]]
+    left.set_xticks(ticks, [f"{t:.0f}" for t in ticks])
+    left.set_yticks(ticks, [f"{t:.0f}" for t in ticks])
+    left.minorticks_off()
     left.set_xlim(*ends)
     left.set_ylim(*ends)
     left.set_xlabel("ordinary EM, nat per frame of an unseen take")

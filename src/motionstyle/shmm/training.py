@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Start = Literal["spread", "random", "seeded"]
 NEVER_STARTS = 1e-6
 LEAST_FRAMES = 1.0
-MERGE_STEPS, MERGE_TRIES = 4, 5
+MERGE_STEPS, MERGE_TRIES = 4, 12
 
 
 @dataclass(frozen=True)
