@@ -17,7 +17,14 @@ from sklearn.cluster import kmeans_plusplus
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.shmm.gaussians import divergences, entropies, estimate, moments
-from motionstyle.shmm.inference import Expectations, Sequences, expectations, pack
+from motionstyle.shmm.inference import (
+    Expectations,
+    Sequences,
+    expectations,
+    expectations_of,
+    log_emissions,
+    pack,
+)
 from motionstyle.shmm.model import HiddenMarkovModel, normalised, repeat
 from motionstyle.shmm.multinomial import entropic_rows, row_entropies, trimmed
 from motionstyle.shmm.schedule import Schedule
@@ -26,7 +33,7 @@ Array = NDArray[np.float64]
 Start = Literal["spread", "random", "seeded"]
 NEVER_STARTS = 1e-6
 LEAST_FRAMES = 1.0
-MERGE_STEPS, MERGE_TRIES = 4, 12
+MERGE_STEPS, MERGE_TRIES = 3, 4
 
 
 @dataclass(frozen=True)
@@ -217,7 +224,7 @@ def _merge(
 ) -> tuple[HiddenMarkovModel, HiddenMarkovModel]:
     """Remove states while that is worth the likelihood it costs; `Schedule.state_cost`.
 
-    Tried in the order of the distance to the nearest other state, each after a few EM steps.
+    Tried in the order of the expected loss, each after a few EM steps.
     """
     schedule = settings.schedule
     d = generic.dimensions
@@ -241,9 +248,7 @@ def _merge(
     removed = True
     while removed and generic.states > 2:
         removed = False
-        gaps = np.linalg.norm(generic.means[:, None] - generic.means[None], axis=-1)
-        np.fill_diagonal(gaps, np.inf)
-        for state in np.argsort(gaps.min(axis=1), kind="stable")[:MERGE_TRIES]:
+        for state in np.argsort(_losses(specifics, packed, own), kind="stable")[:MERGE_TRIES]:
             alive = np.arange(generic.states) != state
             try:
                 tried = refined(_bridged(generic, state, alive), _bridged(specifics, state, alive))
@@ -254,6 +259,18 @@ def _merge(
                 removed = True
                 break
     return generic, specifics
+
+
+def _losses(specifics: HiddenMarkovModel, packed: Sequences, own: NDArray[np.int64]) -> Array:
+    """Return how much log-likelihood each state's frames lose in their next best state, (N,)."""
+    log_b = log_emissions(specifics[own], packed)
+    gamma = expectations_of(
+        specifics.start[own], specifics.transitions[own], log_b, packed.lengths
+    ).occupancy
+    order = np.sort(log_b, axis=-1)
+    best, second = order[..., -1:], order[..., -2:-1]
+    other = np.where(log_b >= best, second, best)
+    return (gamma * (log_b - other)).sum(axis=(0, 1))
 
 
 def _bridged(model: HiddenMarkovModel, state: int, alive: NDArray[np.bool_]) -> HiddenMarkovModel:
