@@ -137,7 +137,7 @@ def dof_figure(explained: pd.DataFrame) -> Figure:
             left.plot(part["dof"], 100 * part["cumulative_share"], **series_style(k), label=label)
             k += 1
     left.axhline(93, color=GROUND, linewidth=0.8)
-    left.annotate("paper: 93 % with 3", (8, 93.5), ha="right", va="bottom", fontsize=SMALL_PT)
+    left.annotate("paper: 93 % with 3", (1, 94), ha="left", va="bottom", fontsize=SMALL_PT)
     left.set_xlabel("style degrees of freedom")
     left.set_ylabel("explained variation about the generic model, %")
     left.set_ylim(0, 104)
