@@ -25,9 +25,11 @@ from motionstyle.figures.style import (
     series_style,
     styled,
 )
+from motionstyle.shmm.choreography import leaving
 
 Array = NDArray[np.float64]
 Arrays = Mapping[str, NDArray[np.generic]]
+LEAST_ARC = 0.15  # of the exits from a state
 NO_DATA = "no motions for this figure in this run"
 
 
@@ -170,16 +172,16 @@ def dance_figure(arrays: Arrays, name: str, row: Mapping[str, object] | None) ->
     figure = new_figure(1.35 * len(names) + 0.6)
     grid = figure.add_gridspec(len(names), 2, width_ratios=[1, 1.25])
     graph = figure.add_subplot(grid[:, 0])
-    n = len(transitions)
     places = _graph_places(np.asarray(arrays[f"{name}_means"], dtype=float))
-    for i, j in np.argwhere((transitions > 0.05) & ~np.eye(n, dtype=bool)):
+    next_state = leaving(transitions)
+    for i, j in np.argwhere(next_state > LEAST_ARC):
         graph.add_patch(
             FancyArrowPatch(
                 tuple(places[i]),
                 tuple(places[j]),
                 arrowstyle="-|>",
                 mutation_scale=4,
-                linewidth=0.3 + 0.9 * float(transitions[i, j]),
+                linewidth=0.2 + 0.8 * float(next_state[i, j]),
                 color=GROUND,
                 connectionstyle="arc3,rad=0.15",
                 shrinkA=3,
@@ -193,7 +195,7 @@ def dance_figure(arrays: Arrays, name: str, row: Mapping[str, object] | None) ->
     figure.colorbar(dots, ax=graph, location="bottom", shrink=0.8, label="mean dwell, frames")
     graph.set_title(
         f"{row['states_start']} to {row['states_end']} states, {row['parameters']} parameters, "
-        f"{row['frames']} frames\n(paper: 75 to 69, about 3500, over 6000); arcs above 5 %",
+        f"{row['frames']} frames\n(paper: 75 to 69, about 3500, over 6000);\narcs: over 15 % of exits",
         loc="left",
         fontsize=SMALL_PT,
     )
@@ -554,7 +556,7 @@ def novice_figure(table: pd.DataFrame) -> Figure:
     panels[0].set_ylabel("error to the clean original, deg rms")
     for axes, column, label in (
         (panels[1], "jerk_ratio", "jerk after / before"),
-        (panels[2], "loglik_gain_nat_per_frame", "gain under the expert, nat per frame"),
+        (panels[2], "loglik_gain_nat_per_frame", "gain under expert, nat/frame"),
     ):
         axes.bar(range(len(table)), table[column].astype(float), color=SERIES[1])
         axes.set_xticks(range(len(table)), [f"seed {s}" for s in table["seed"]], fontsize=SMALL_PT)
