@@ -195,7 +195,8 @@ def dance_figure(arrays: Arrays, name: str, row: Mapping[str, object] | None) ->
     figure.colorbar(dots, ax=graph, location="bottom", shrink=0.8, label="mean dwell, frames")
     graph.set_title(
         f"{row['states_start']} to {row['states_end']} states, {row['parameters']} parameters, "
-        f"{row['frames']} frames\n(paper: 75 to 69, about 3500, over 6000);\narcs: over 15 % of exits",
+        f"{row['frames']} frames\n(paper: 75 to 69, about 3500, over 6000);\n"
+        "arcs: over 15 % of exits",
         loc="left",
         fontsize=SMALL_PT,
     )
