@@ -13,6 +13,7 @@ include: "workflow/rules/style_machines_common.smk"
 include: "workflow/rules/style_machines.smk"
 include: "workflow/rules/mocap.smk"
 include: "workflow/rules/physics.smk"
+include: "workflow/rules/moments.smk"
 include: "workflow/rules/evaluation.smk"
 include: "workflow/rules/report.smk"
 

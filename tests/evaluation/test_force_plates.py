@@ -5,7 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motionstyle.evaluation.force_plates import FORCE_PLATE_COLUMNS, FootForce, force_plate_rows
+from motionstyle.evaluation.force_plates import (
+    FORCE_PLATE_COLUMNS,
+    FootForce,
+    compared_frames,
+    force_plate_rows,
+)
 
 
 @pytest.fixture
@@ -73,3 +78,36 @@ def test_frames_outside_the_record_are_not_judged(pushed):
     short = FootForce(plate.times[:half], plate.force[:half])
     vertical = row(force_plate_rows(motion, {"r": short}, "test"), "vertical")
     assert vertical["seconds_compared"] < motion.times[-1] * 0.55
+
+
+def test_a_step_beside_the_plates_is_not_judged_and_a_load_made_up_in_swing_is(pushed):
+    """The left foot stands beside the plates first, and in swing bears what it should not."""
+    motion, _plate = pushed
+    weight = motion.body.mass * 9.81
+    both = np.concatenate([np.linspace(0, weight, 15), np.full(45, weight)])
+    nothing = np.zeros(60)
+    beside = np.where(np.arange(60) < 12, 400.0, 0.0)  # ends while weight comes onto the plates
+    assert not compared_frames(nothing, beside, both, weight).any()
+    in_swing = np.where((np.arange(60) > 30) & (np.arange(60) < 40), 200.0, 0.0)
+    judged = compared_frames(nothing, in_swing, both, weight)
+    np.testing.assert_array_equal(np.flatnonzero(judged), np.arange(31, 40))
+
+
+def test_a_stance_the_plate_saw_is_judged_whole(pushed):
+    motion, _plate = pushed
+    weight = motion.body.mass * 9.81
+    seen = np.where((np.arange(60) > 20) & (np.arange(60) < 50), 500.0, 0.0)
+    early = np.where((np.arange(60) > 15) & (np.arange(60) < 45), 500.0, 0.0)
+    judged = compared_frames(seen, early, seen, weight)
+    np.testing.assert_array_equal(np.flatnonzero(judged), np.arange(16, 50))
+
+
+def test_a_wrong_mass_is_told_from_other_errors(pushed):
+    motion, plate = pushed
+    heavier = FootForce(plate.times, 1.3 * plate.force)
+    vertical = row(force_plate_rows(motion, {"r": heavier}, "test"), "vertical")
+    assert vertical["plate_over_estimate"] == pytest.approx(1.3, rel=0.01)
+    assert vertical["rms_own_pctbw"] < 0.5
+    assert vertical["rms_pctbw"] > 15
+    weight = motion.body.mass * 9.81
+    assert vertical["rms_n"] == pytest.approx(vertical["rms_pctbw"] * weight / 100)

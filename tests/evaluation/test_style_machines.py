@@ -21,7 +21,7 @@ from motionstyle.evaluation.style_machines import (
     synthesis,
 )
 from motionstyle.evaluation.style_machines.store import load_arrays, save_arrays
-from motionstyle.mocap.floor import StanceThresholds
+from motionstyle.mocap.fitting.floor import StanceThresholds
 from motionstyle.shmm.features import coordinates_of
 from motionstyle.shmm.machine import MachineSettings, learn_machine
 from motionstyle.shmm.schedule import Schedule

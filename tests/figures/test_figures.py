@@ -17,15 +17,47 @@ from matplotlib.image import imread
 from motionstyle.body.layout import CONTACT_POINTS, COORDINATES, NODES
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.normative import read_normative
-from motionstyle.figures.bodies import body_figure, marker_figure
+from motionstyle.figures.bodies import body_figure, marker_figure, marker_fit_figure
+from motionstyle.figures.force_strips import METRES_PER_WEIGHT, force_strip_figure
 from motionstyle.figures.gait import gait_figure
+from motionstyle.figures.moments import joint_moment_figure, plate_moment_figure
+from motionstyle.figures.residuals import residual_figure
 from motionstyle.figures.skeleton import BONES, named_points, project
 from motionstyle.figures.strips import LONGEST_M, stick_strip, strip_figure
 from motionstyle.figures.style import SIDE_COLOURS, SIDE_LINES, motion_title, new_figure, save
 
 ROOT = Path(__file__).parents[2]
 NORMATIVE = read_normative(ROOT / "config" / "normative_gait.yaml")
+POOLED = {"virtual": {"foot, centre": [0.2, 0.4]}, "measured": {"asis": [1.0], "heel": [2.0, 3.0]}}
+RESIDUALS = [
+    {
+        "id": f"clip{k}",
+        "status": status,
+        "force_before_pctbw": "20",
+        "force_after_pctbw": "0.1",
+        "moment_before_nm": "30",
+        "moment_after_nm": "0.2",
+    }
+    for k, status in enumerate(("converged", "not converged"))
+]
 MARKERS = {"a": {"pelvis centre": 0.2, "toes_r x": 2.5}, "b": {"pelvis centre": 0.4}}
+
+
+def cycles():
+    """Moments of a walk whose right leg was on a plate, and of a run."""
+    leg = {"r": list(np.sin(np.linspace(0, 6, 101)))}
+    walk = {"estimated": dict.fromkeys(("hip", "knee", "ankle"), leg)}
+    walk["measured"] = walk["estimated"]
+    none = {joint: {} for joint in ("hip", "knee", "ankle")}
+    run = {**walk, "measured": none, "level_walk": False, "action": "run"}
+    return {"walk": {**walk, "level_walk": True, "action": "walk"}, "run": run}
+
+
+def stances():
+    """Moments of the right leg, of which the plate saw the second half."""
+    times = list(np.linspace(0, 1, 10))
+    seen = [None] * 5 + [0.5] * 5
+    return [{"foot": "r", "times": times, "estimated": [times] * 3, "measured": [seen] * 3}]
 
 
 def makers(motion):
@@ -34,6 +66,11 @@ def makers(motion):
         "body": lambda: body_figure(motion.body),
         "gait": lambda: gait_figure([motion], NORMATIVE),
         "markers": lambda: marker_figure(MARKERS),
+        "marker_fit": lambda: marker_fit_figure(POOLED),
+        "force_strips": lambda: force_strip_figure([motion], ["clip"]),
+        "root_residual": lambda: residual_figure(RESIDUALS),
+        "joint_moments": lambda: joint_moment_figure(cycles(), NORMATIVE),
+        "plate_moments": lambda: plate_moment_figure({"clip": stances()}),
     }
 
 
@@ -41,7 +78,13 @@ def all_text(figure) -> list[str]:
     return [t.get_text() for t in figure.findobj(matplotlib.text.Text) if t.get_text()]
 
 
-@pytest.mark.parametrize("name", ["strips", "body", "gait", "markers"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("strips", "body", "gait", "markers", "marker_fit", "force_strips", "root_residual"),
+        *("joint_moments", "plate_moments"),
+    ],
+)
 def test_files_are_written_and_have_the_same_bytes_each_time(plain_motion, tmp_path, name):
     make = makers(plain_motion)[name]
     first = save(make(), tmp_path / "1" / name)
@@ -60,7 +103,13 @@ def test_a_dot_in_the_name_is_not_an_ending(plain_motion, tmp_path):
     assert (svg.name, png.name) == ("markers.v2.svg", "markers.v2.png")
 
 
-@pytest.mark.parametrize("name", ["strips", "body", "gait", "markers"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("strips", "body", "gait", "markers", "marker_fit", "force_strips", "root_residual"),
+        *("joint_moments", "plate_moments"),
+    ],
+)
 def test_nothing_is_cut_off_and_text_is_readable(plain_motion, tmp_path, name):
     figure = makers(plain_motion)[name]()
     sizes = {t.get_fontsize() for t in figure.findobj(matplotlib.text.Text) if t.get_text()}
@@ -210,3 +259,34 @@ def test_marker_bars_are_the_means_of_the_clips_that_have_the_marker():
     assert [t.get_text() for t in axes.get_yticklabels()] == ["pelvis centre", "toes_r x"]
     with pytest.raises(MotionStyleError, match="no clip"):
         marker_figure({})
+
+
+def test_force_arrows_are_as_long_as_the_force_and_start_under_the_foot(plain_motion):
+    """In the made-up motion the bearing points share the weight, pushed a little forward."""
+    figure = force_strip_figure([plain_motion])
+    arrows = [t for t in figure.axes[0].texts if getattr(t, "arrow_patch", None) is not None]
+    assert len(arrows) >= 9
+    feet = np.array([a.xyann for a in arrows])
+    lengths = np.array([np.subtract(a.xy, a.xyann) for a in arrows])
+    np.testing.assert_allclose(feet[:, 1], 0, atol=0.25)
+    assert (lengths[:, 1] > 0).all()
+    np.testing.assert_allclose(lengths[:, 0] / lengths[:, 1], 0.1, atol=1e-3)
+    assert lengths[:, 1].max() == pytest.approx(METRES_PER_WEIGHT, rel=1e-6)
+
+
+def test_motions_without_forces_have_no_arrows_to_draw(plain_motion):
+    with pytest.raises(MotionStyleError, match="no contact forces"):
+        force_strip_figure([replace(plain_motion, contact_forces=None)])
+
+
+def test_fits_that_did_not_converge_are_told_apart():
+    text = all_text(residual_figure(RESIDUALS))
+    assert "after, fit not converged" in text
+    assert {"clip0", "clip1"} <= set(text)
+
+
+def test_published_bands_are_drawn_over_the_walks_alone():
+    figure = joint_moment_figure(cycles(), NORMATIVE)
+    bars = [len(axes.patches) for axes in figure.axes]
+    assert bars == [6, 6, 4, 0, 0, 0]  # filled and outlined: three, three and two instants
+    assert "(legs: 1, on plates: 1)" in figure.axes[0].get_ylabel()

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.asf_amc import find_asf, read_asf_amc
-from motionstyle.mocap.bvh import read_bvh
+from motionstyle.mocap.formats.asf_amc import find_asf, read_asf_amc
+from motionstyle.mocap.formats.bvh import read_bvh
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 

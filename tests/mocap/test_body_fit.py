@@ -25,11 +25,11 @@ from motionstyle.body.layout import (
     PARENTS,
 )
 from motionstyle.body.rotations import exponential, logarithm
-from motionstyle.mocap import body_fit
-from motionstyle.mocap.clip import SkeletonClip
-from motionstyle.mocap.floor import StanceThresholds
-from motionstyle.mocap.planted_legs import Leg, solve_leg
-from motionstyle.mocap.skeleton_map import SkeletonMap, read_skeleton_map
+from motionstyle.mocap.fitting import body_fit
+from motionstyle.mocap.fitting.floor import StanceThresholds
+from motionstyle.mocap.formats.clip import SkeletonClip
+from motionstyle.mocap.planted.legs import Leg, solve_leg
+from motionstyle.mocap.skeletons.skeleton_map import SkeletonMap, read_skeleton_map
 
 SKELETONS = Path(__file__).parents[2] / "config" / "skeletons"
 CMU = read_skeleton_map(SKELETONS, "cmu_asf")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.bvh import read_bvh
+from motionstyle.mocap.formats.bvh import read_bvh
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 

@@ -4,53 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import ezc3d
 import numpy as np
 import pytest
 
+from marker_person import RATIO, write_c3d
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.c3d import body_mass, read_c3d, read_c3d_forces
+from motionstyle.mocap.formats.c3d import body_mass, read_c3d, read_c3d_forces
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 needs_mirror = pytest.mark.skipif(not MIRROR.is_dir(), reason="no mirror folder")
-FRAMES, RATIO = 12, 10
-
-
-def write_c3d(
-    path, points, labels, *, rate=100.0, unit="mm", descriptions=None, residuals=None, plate=None
-):
-    """Write points (F, M, 3) in the unit; `plate` (F·RATIO, 6) are a plate's channels in N, N·mm.
-
-    The plate lies on the floor, 0.6 m along x and 0.4 m along y from the origin.
-    """
-    file = ezc3d.c3d()
-    frames = len(points)
-    file["parameters"]["POINT"]["RATE"]["value"] = [rate]
-    file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
-    file["parameters"]["POINT"]["LABELS"]["value"] = list(labels)
-    if descriptions:
-        file["parameters"]["POINT"]["DESCRIPTIONS"]["value"] = list(descriptions)
-    data = np.ones((4, len(labels), frames))
-    data[:3] = np.transpose(points, (2, 1, 0))
-    file["data"]["points"] = data
-    if residuals is not None:
-        file["data"]["meta_points"]["residuals"] = residuals.T[None].astype(float)
-    if plate is not None:
-        names = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
-        file["parameters"]["ANALOG"]["RATE"]["value"] = [rate * RATIO]
-        file["parameters"]["ANALOG"]["LABELS"]["value"] = names
-        file["parameters"]["ANALOG"]["UNITS"]["value"] = ["N"] * 3 + ["Nmm"] * 3
-        file["data"]["analogs"] = plate.T[None]
-        corners = np.array([[600, 400, 0], [600, 0, 0], [0, 0, 0], [0, 400, 0]], dtype=float)
-        file.add_parameter("FORCE_PLATFORM", "USED", 1)
-        file.add_parameter("FORCE_PLATFORM", "TYPE", 2)
-        file.add_parameter("FORCE_PLATFORM", "CHANNEL", 0)
-        file["parameters"]["FORCE_PLATFORM"]["CHANNEL"]["value"] = np.arange(1, 7)[:, None]
-        file.add_parameter("FORCE_PLATFORM", "CORNERS", corners.T[:, :, None])
-        file.add_parameter("FORCE_PLATFORM", "ORIGIN", np.zeros((3, 1)))
-        file.add_parameter("FORCE_PLATFORM", "ZERO", 0)
-    file.write(str(path))
-    return path
+FRAMES = 12
 
 
 def some_points(markers=2):
@@ -104,6 +67,16 @@ def test_a_file_cut_off_in_its_header_is_refused(tmp_path):
     path = write_c3d(tmp_path / "a.c3d", some_points(), ["A", "B"])
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(MotionStyleError, match=r"a\.c3d"):
+        read_c3d(path)
+
+
+def test_a_file_cut_off_in_its_frames_is_refused(tmp_path):
+    """ezc3d itself reads what is left as if that were all."""
+    points = np.tile(some_points(), (20, 1, 1))
+    path = write_c3d(tmp_path / "a.c3d", points, ["A", "B"])
+    assert read_c3d(path).frames == len(points)
+    path.write_bytes(path.read_bytes()[:-3000])
+    with pytest.raises(MotionStyleError, match=r"declares 240 frames, but \d+ follow.*cut off"):
         read_c3d(path)
 
 

@@ -11,9 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.checks import UNITS, body_length, check_clip, pelvis_joint
-from motionstyle.mocap.clip import SkeletonClip, forward_kinematics
-from motionstyle.mocap.readers import read_clip
+from motionstyle.mocap.formats.clip import SkeletonClip, forward_kinematics
+from motionstyle.mocap.formats.readers import read_clip
+from motionstyle.mocap.skeletons.checks import UNITS, body_length, check_clip, pelvis_joint
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 

@@ -9,8 +9,8 @@ from test_body_fit import SKELETONS, known_gait
 
 from motionstyle.body.kinematics import contact_points, forward_kinematics
 from motionstyle.body.layout import CONTACT_POINTS
-from motionstyle.mocap.contacts import detect_contacts, ground_height
-from motionstyle.mocap.floor import StanceThresholds, runs
+from motionstyle.mocap.fitting.contacts import detect_contacts, ground_height
+from motionstyle.mocap.fitting.floor import StanceThresholds, runs
 from motionstyle.mocap.settings import RetargetSettings, by_action
 
 CONFIG = yaml.safe_load((SKELETONS.parent / "config.yaml").read_text())
@@ -66,8 +66,8 @@ def test_each_point_is_judged_alone_but_the_ball_as_one():
 
 def test_level_ground_is_zero_everywhere():
     points = np.random.default_rng(0).normal(size=(30, 8, 3))
-    assert not ground_height(points, RATE, level=True).any()
-    assert ground_height(points, RATE, level=True).shape == (30, 8)
+    assert not ground_height(points, RATE, WALK, level=True).any()
+    assert ground_height(points, RATE, WALK, level=True).shape == (30, 8)
 
 
 def stairs(rise=0.17):
@@ -90,7 +90,7 @@ def stairs(rise=0.17):
 
 def test_ground_under_steps_is_the_step():
     points, stand = stairs()
-    ground = ground_height(points, RATE, level=False)
+    ground = ground_height(points, RATE, WALK, level=False)
     first = np.flatnonzero(np.diff(stand.astype(int)) == 1) + 1
     for step, begin in enumerate([0, *first]):
         # whatever swing lies within half a second is higher than this stair, the former one not
@@ -100,8 +100,21 @@ def test_ground_under_steps_is_the_step():
     for (a, b), (c, d) in zip(runs(found[:, 0]), runs(stand), strict=True):
         assert abs(a - c) <= 3
         assert abs(b - d) <= 3
-    flat = detect_contacts(points, RATE, WALK, ground_height(points, RATE, level=True))
+    flat = detect_contacts(points, RATE, WALK, ground_height(points, RATE, WALK, level=True))
     assert len(runs(flat[:, 0])) == 1  # only the lowest stair is at the level of the floor
+
+
+def test_going_down_a_foot_stands_on_its_step_until_it_leaves_it():
+    """Half a second later the point rests a stair lower; that is not yet its ground."""
+    points, stand = stairs()
+    down = points[::-1].copy()
+    stand = stand[::-1]
+    ground = ground_height(down, RATE, WALK, level=False)
+    np.testing.assert_allclose(ground[stand], down[..., 1][stand], atol=0.01)
+    found = detect_contacts(down, RATE, WALK, ground)
+    for (a, b), (c, d) in zip(runs(found[:, 0]), runs(stand), strict=True):
+        assert abs(a - c) <= 3
+        assert abs(b - d) <= 3
 
 
 @pytest.mark.parametrize("rate", [60.0, 100.0, 120.0])

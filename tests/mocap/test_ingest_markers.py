@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from test_body_fit import known_gait
 from test_contacts import SETTINGS, assert_stances
-from test_markerset import SETS, places, synthetic_markers, write_set
-from test_mot import forces_file
+from test_markerset import SETS
 
+from marker_person import forces_file, places, synthetic_markers, write_set, write_trc
+from motionstyle.body.body import BodyGeometry, build_body
 from motionstyle.body.layout import COORDINATE_INDEX, COORDINATES, NODE_INDEX
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.doors import read_datasets
-from motionstyle.mocap.ingest_markers import ingest_markers, placed_forces
-from motionstyle.mocap.marker_clip import ForceRecord
-from motionstyle.mocap.marker_joints import common_centre
-from motionstyle.mocap.marker_paths import Placement, fill_gaps
-from motionstyle.mocap.markerset import Plates, read_marker_set
-from motionstyle.mocap.plate_feet import forces_by_foot, middle_of_feet
-from motionstyle.mocap.sheet import ClipRow, read_sheet
+from motionstyle.mocap.datasets.doors import read_datasets
+from motionstyle.mocap.datasets.sheet import ClipRow, read_sheet
+from motionstyle.mocap.formats.marker_clip import ForceRecord
+from motionstyle.mocap.markers.ingest import ingest_markers, placed_forces
+from motionstyle.mocap.markers.joints import common_centre
+from motionstyle.mocap.markers.markerset import Plates, read_marker_set
+from motionstyle.mocap.markers.paths import Placement, fill_gaps
+from motionstyle.mocap.markers.plate_feet import forces_by_foot, middle_of_feet
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 CONFIG = Path(__file__).parents[2] / "config"
@@ -39,25 +40,6 @@ def row(path, **changes):
         "folder": path.parent,
     }  # fmt: skip
     return ClipRow(**(values | changes))
-
-
-def write_trc(path, clip):
-    """Write a marker clip in mm; unseen samples are empty cells."""
-    header = [
-        "PathFileType\t4\t(X/Y/Z)\tmade.trc",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits",
-        f"{clip.rate_hz}\t{clip.rate_hz}\t{clip.frames}\t{len(clip.labels)}\tmm",
-        "Frame#\tTime\t" + "\t\t\t".join(clip.labels) + "\t\t",
-        "\t\t" + "\t".join(f"{a}{k + 1}" for k in range(len(clip.labels)) for a in "XYZ"),
-        "",
-    ]
-    lines = [
-        f"{f + 1}\t{f / clip.rate_hz + clip.start_s:.6f}\t"
-        + "\t".join("" if np.isnan(v) else f"{1000 * v:.6f}" for v in frame.ravel())
-        for f, frame in enumerate(clip.positions)
-    ]
-    path.write_text("\n".join(header + lines) + "\n", encoding="utf-8")
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +96,31 @@ def test_without_a_static_trial_the_walk_itself_tells_the_lengths(tmp_path, lab,
     away = np.degrees(found.motion.coordinates - gait.coordinates)[:, LEGS]
     assert np.sqrt(((away - away.mean(axis=0)) ** 2).mean()) < 2.5
     assert found.motion.provenance["measured_on"] == "walk.trc"
+
+
+def test_the_static_trial_scales_the_body_and_not_the_walk(tmp_path, lab, gait, standing):
+    """A trial of somebody a tenth larger: lengths are theirs, though the walk shows others."""
+    walk, _ = files(tmp_path, gait, standing)
+    small, geometry = gait.body, gait.body.geometry
+    larger = build_body(
+        BodyGeometry(
+            1.1 * geometry.joint_offsets, 1.1 * geometry.contact_points, 1.1 * geometry.end_points
+        ),
+        small.mass,
+    )
+    standing = standing.copy()
+    standing[0, 1] *= 1.1
+    still = synthetic_markers(larger, np.tile(standing, (20, 1)), RATE)
+    static = write_trc(tmp_path / "larger.trc", still)
+    scaled = ingest(walk, lab, static=static).motion
+    own = ingest(walk, lab).motion
+    assert own.body.leg_length == pytest.approx(small.leg_length, abs=0.02)
+    assert scaled.body.leg_length == pytest.approx(1.1 * small.leg_length, abs=0.01)
+    for node in ("shank_r", "foot_l", "forearm_r"):
+        length = np.linalg.norm(small.joint_offsets[NODE_INDEX[node]])
+        found = np.linalg.norm(scaled.body.joint_offsets[NODE_INDEX[node]])
+        assert found == pytest.approx(1.1 * length, abs=0.01), node
+    assert scaled.provenance["measured_on"] == "larger.trc"
 
 
 def test_a_walk_in_any_direction_is_turned_and_moved(tmp_path, lab, gait, standing):
@@ -264,6 +271,28 @@ def test_a_flipped_plate_is_refused(tmp_path, lab, gait, standing):
     walk, static = files(tmp_path, gait, standing)
     with pytest.raises(MotionStyleError, match="mean vertical force is negative on plate 'left'"):
         ingest(walk, lab, static=static, forces=forces_file(tmp_path, sign=-1.0))
+
+
+def test_plates_in_another_unit_are_refused(tmp_path, lab, gait, standing):
+    """Centres written in mm, read in m, lie a hundred metres from the person."""
+    walk, static = files(tmp_path, gait, standing)
+    forces = forces_file(tmp_path, rows=2000)
+    text = forces.read_text(encoding="utf-8").replace("1.000000e-01", "1.000000e+02")
+    forces.write_text(text, encoding="utf-8")
+    with pytest.raises(MotionStyleError, match=r"grf\.mot: the centre of pressure lies .* `unit`"):
+        ingest(walk, lab, static=static, forces=forces)
+
+
+def test_a_marker_of_no_need_that_is_never_seen_is_left_out(tmp_path, lab, gait, standing):
+    def unseen(clip):
+        positions = np.array(clip.positions)
+        positions[:, clip.labels.index("M_head_top")] = np.nan
+        return positions
+
+    walk, static = files(tmp_path, gait, standing, positions=unseen)
+    found = ingest(walk, lab, static=static)
+    assert "M_head_top" not in found.marker_rms_cm
+    assert found.report["marker_rms_cm"] < 0.6
 
 
 def test_a_static_trial_without_knees_is_refused(tmp_path, lab, gait, standing):

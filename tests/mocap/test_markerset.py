@@ -1,7 +1,4 @@
-"""Marker sets: the shipped ones, faults in them, and clips that do not fit them or any person.
-
-`synthetic_markers` and `SET` serve the tests of ingestion too.
-"""
+"""Marker sets: the shipped ones, faults in them, and clips that do not fit them or any person."""
 
 from __future__ import annotations
 
@@ -10,17 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
-from motionstyle.body.body import Body
-from motionstyle.body.kinematics import forward_kinematics, points_in_world
-from motionstyle.body.layout import CONTACT_POINTS, NODE_INDEX
+from marker_person import SET, synthetic_markers, write_set
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.c3d import read_c3d
-from motionstyle.mocap.marker_checks import check_clip_of_person, check_sides, check_size
-from motionstyle.mocap.marker_clip import MarkerClip, scaled, upright
-from motionstyle.mocap.markerset import LANDMARKS, assign_labels, read_marker_set
-from motionstyle.mocap.trc import read_trc
+from motionstyle.mocap.formats.c3d import read_c3d
+from motionstyle.mocap.formats.marker_clip import scaled, upright
+from motionstyle.mocap.formats.trc import read_trc
+from motionstyle.mocap.markers.checks import check_clip_of_person, check_sides, check_size
+from motionstyle.mocap.markers.markerset import LANDMARKS, assign_labels, read_marker_set
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 SETS = Path(__file__).parents[2] / "config" / "markersets"
@@ -34,109 +28,6 @@ FILES = {
     "bmc": ("bmc", "*.c3d"),
     "cmu41": ("cmu/c3d", "*.c3d"),
 }
-CLUSTERS = {
-    "thigh": [(0.07, -0.12, 0.02), (0.05, -0.20, 0.06), (-0.02, -0.28, 0.07)],
-    "shank": [(0.04, -0.10, 0.03), (0.05, -0.20, 0.04), (-0.03, -0.25, 0.05)],
-}
-
-
-def places(body: Body) -> dict[str, tuple[str, np.ndarray]]:
-    """Where each landmark and cluster marker sits: node and place on it, m.
-
-    The pelvis' markers lie so that the hip regression gives the body's own hips, the others so
-    that joint centres lie midway, as on an ideal subject.
-    """
-    offsets = body.joint_offsets
-    contact = dict(zip(CONTACT_POINTS, body.geometry.contact_points, strict=True))
-    width = (offsets[NODE_INDEX["thigh_r"], 2] - 0.0073) / 0.33
-    depth, neck = 0.16, offsets[NODE_INDEX["head"]]
-    front = np.array([0.24 * depth + 0.0099, 0.30 * width + 0.0109, 0.0])
-    found = {
-        "c7": ("thorax", np.subtract(neck, [0.05, 0, 0])),
-        "clavicle": ("thorax", np.add(neck, [0.06, -0.06, 0])),
-        "sternum": ("thorax", np.add(neck, [0.10, -0.20, 0])),
-        "t10": ("thorax", np.add(neck, [-0.09, -0.25, 0])),
-        "head_top": ("head", np.array([0.0, 0.24, 0.0])),
-    }
-    for side, sign in (("r", 1.0), ("l", -1.0)):
-
-        def at(node, x, y, z, centre=(0, 0, 0), side=side, sign=sign):
-            return (f"{node}_{side}", np.add(centre, [x, y, sign * z]))
-
-        def joint(node, side=side):
-            return offsets[NODE_INDEX[f"{node}_{side}"]]
-
-        shoulder = joint("upper_arm")
-        span = 2 * abs(shoulder[2])
-        ball = joint("toes")
-        found |= {
-            f"asis_{side}": ("pelvis", np.add(front, [0, 0, sign * width / 2])),
-            f"psis_{side}": ("pelvis", np.add(front, [-depth, 0, sign * 0.05])),
-            f"knee_lateral_{side}": at("thigh", 0, 0, 0.05, joint("shank")),
-            f"knee_medial_{side}": at("thigh", 0, 0, -0.05, joint("shank")),
-            f"ankle_lateral_{side}": at("shank", 0, 0, 0.036, joint("foot")),
-            f"ankle_medial_{side}": at("shank", 0, 0, -0.036, joint("foot")),
-            f"heel_{side}": at("foot", -0.01, 0.03, 0, contact[f"heel_{side}"]),
-            f"mtp_lateral_{side}": at("foot", 0, 0, 0.045, ball),
-            f"mtp_medial_{side}": at("foot", 0, 0, -0.045, ball),
-            f"toe_tip_{side}": at("toes", contact[f"toe_{side}"][0], 0, 0),
-            f"acromion_{side}": ("thorax", np.add(shoulder, [0, 0.17 * span, 0])),
-            f"elbow_lateral_{side}": at("upper_arm", 0, 0, 0.04, joint("forearm")),
-            f"elbow_medial_{side}": at("upper_arm", 0, 0, -0.04, joint("forearm")),
-            f"wrist_radius_{side}": at("forearm", 0.025, 0, 0, joint("hand")),
-            f"wrist_ulna_{side}": at("forearm", -0.025, 0, 0, joint("hand")),
-            f"head_front_{side}": ("head", np.array([0.09, 0.15, sign * 0.07])),
-            f"head_back_{side}": ("head", np.array([-0.09, 0.15, sign * 0.07])),
-        }
-        for node, spots in CLUSTERS.items():
-            for k, (x, y, z) in enumerate(spots):
-                found[f"{node}{k}_{side}"] = at(node, x, y, z)
-    return found
-
-
-def synthetic_markers(
-    body: Body, coordinates: np.ndarray, rate_hz: float, *, without: tuple[str, ...] = ()
-) -> MarkerClip:
-    """The markers of `places` on a body in known poses, but those whose names begin so."""
-    found = {k: v for k, v in places(body).items() if not k.startswith(without or ("?",))}
-    nodes = np.array([NODE_INDEX[node] for node, _ in found.values()])
-    local = np.array([place for _, place in found.values()])
-    world = points_in_world(forward_kinematics(body, coordinates), nodes, local)
-    return MarkerClip(tuple(f"M_{name}" for name in found), world, rate_hz, "made.trc")
-
-
-SET = {
-    "landmarks": {name: f"M_{name}" for name in LANDMARKS if name not in {"sacrum"}},
-    "tracking": {
-        f"{node}_{side}": [f"M_{node}{k}_{side}" for k in range(3)]
-        for node in CLUSTERS
-        for side in "rl"
-    },
-    "treadmill": ["belt*"],
-    "forces": [
-        {
-            "files": "*",
-            "plates": {
-                name: {
-                    "foot": name,
-                    "force": f"{prefix}ground_force_v",
-                    "point": f"{prefix}ground_force_p",
-                    "moment": f"{prefix}ground_torque_",
-                }
-                for name, prefix in (("left", ""), ("right", "1_"))
-            },
-        }
-    ],
-}
-for _name in ("toe_r", "toe_l", "finger_r", "finger_l"):
-    del SET["landmarks"][_name]
-
-
-def write_set(folder: Path, **changes: object) -> Path:
-    """Write `SET` with changed sections as lab.yaml."""
-    text = yaml.safe_dump({**SET, **changes})
-    (folder / "lab.yaml").write_text(text, encoding="utf-8")
-    return folder
 
 
 @pytest.fixture
@@ -187,6 +78,8 @@ def test_an_unknown_set_has_near_matches():
         ({"tracking": {"tigh_r": ["A"]}}, ["unknown node 'tigh_r'", "did you mean thigh_r"]),
         ({"tracking": {"thigh_r": ["M_c7"]}}, ["label 'M_c7' stands there 2 times"]),
         ({"up_axis": "x"}, ["up_axis is 'x'"]),
+        ({"landmarks": ["heel_r"]}, ["landmarks must be a mapping"]),
+        ({"forces": {"files": "*"}}, ["forces must be a list"]),
         ({"forces": [{"plates": {"1": "rigt"}}]}, ["foot 'rigt'", "did you mean right"]),
         ({"forces": [{"plates": {"1": "left"}, "unit": "ft"}]}, ["unit 'ft'"]),
     ],
@@ -258,6 +151,25 @@ def test_swapped_sides_are_refused(lab, clip):
         for name in names:
             if name in LANDMARKS or f"{name}_r" in LANDMARKS:
                 assert f"'M_{name}_r' lies" in str(caught.value)
+
+
+def exchanged(clip, one, two):
+    """Exchange two kinds of markers on both sides."""
+    order = list(clip.labels)
+    for side in "rl":
+        a, b = order.index(f"M_{one}_{side}"), order.index(f"M_{two}_{side}")
+        order[a], order[b] = order[b], order[a]
+    return replace(clip, labels=tuple(order))
+
+
+def test_a_pelvis_back_to_front_is_told_from_swapped_sides(lab, clip):
+    wrong = exchanged(clip, "asis", "psis")
+    with pytest.raises(
+        MotionStyleError, match="both feet point to the back of the pelvis"
+    ) as found:
+        check_clip_of_person(wrong, assign_labels(wrong, lab))
+    assert "'M_asis_r' and 'M_asis_l'" in str(found.value)
+    assert "'M_psis_r' and 'M_psis_l'" in str(found.value)
 
 
 @pytest.mark.parametrize(

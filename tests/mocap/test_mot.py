@@ -8,32 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marker_person import NAMES, forces_file
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.mot import PlateColumns, forces_from_mot, read_mot
+from motionstyle.mocap.formats.mot import PlateColumns, forces_from_mot, read_mot
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 PLATES = {
     "right": PlateColumns("1_ground_force_v", "1_ground_force_p", "1_ground_torque_"),
     "left": PlateColumns("ground_force_v", "ground_force_p", "ground_torque_"),
 }
-NAMES = [p + k + a for p in ("", "1_") for k in ("ground_force_v", "ground_force_p") for a in "xyz"]
-NAMES += [p + "ground_torque_" + a for p in ("", "1_") for a in "xyz"]
-
-
-def forces_file(folder, *, rows=6, sign=1.0, names=NAMES, header=None, name="grf.mot"):
-    """Write plates: 700 N at (0.1, 0, 0.2) m on the left, 10 N (unloaded) on the right."""
-    header = f"trial\nversion=1\nnRows={rows}\nnColumns={len(names) + 1}\ninDegrees=yes\n" if (
-        header is None
-    ) else header  # fmt: skip
-    lines = [header + "endheader", "time\t\t" + "\t".join(names)]
-    known = {"ground_force_vy": 700.0 * sign, "ground_force_px": 0.1, "ground_force_pz": 0.2}
-    known |= {"1_ground_force_vy": 10.0, "ground_torque_y": 3.0}
-    for k in range(rows):
-        values = [0.5 + 0.001 * k, *(known.get(n, 0.0) for n in names)]
-        lines.append("\t ".join(f"{v:.6e}" for v in values) + "\t")
-    path = folder / name
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
 
 
 def test_it_reads_names_values_and_angles_unit(tmp_path):

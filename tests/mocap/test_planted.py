@@ -12,15 +12,15 @@ from motionstyle.body.body import BodyGeometry, build_body
 from motionstyle.body.kinematics import contact_points, forward_kinematics
 from motionstyle.body.layout import CONTACT_POINTS, COORDINATE_INDEX, COORDINATES, NODE_INDEX, NODES
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.floor import runs
-from motionstyle.mocap.planted import (
+from motionstyle.mocap.fitting.floor import runs
+from motionstyle.mocap.planted.legs import Leg, solve_leg
+from motionstyle.mocap.planted.variants import (
     PlantedRecipe,
     plant,
     read_planted,
     shared_source_frames,
     source_frames_of,
 )
-from motionstyle.mocap.planted_legs import Leg, solve_leg
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.storage import load_motion, save_motion
 

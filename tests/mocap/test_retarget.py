@@ -18,11 +18,15 @@ from motionstyle.body.layout import (
     NODES,
 )
 from motionstyle.body.rotations import exponential
-from motionstyle.mocap import retarget
-from motionstyle.mocap.body_fit import NodeFrames, measure_body, node_frames
-from motionstyle.mocap.contacts import detect_contacts
-from motionstyle.mocap.floor import runs
-from motionstyle.mocap.markers import ground_markers, marker_distances, place_markers
+from motionstyle.mocap.fitting import retarget
+from motionstyle.mocap.fitting.body_fit import NodeFrames, measure_body, node_frames
+from motionstyle.mocap.fitting.contacts import detect_contacts
+from motionstyle.mocap.fitting.floor import runs
+from motionstyle.mocap.fitting.virtual_markers import (
+    ground_markers,
+    marker_distances,
+    place_markers,
+)
 
 RATE = 100.0
 ALL = np.ones(len(COORDINATES), dtype=bool)

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.doors import DatasetFile, read_datasets
-from motionstyle.mocap.sheet import COLUMNS, METRES, companion_skeleton, read_sheet
-from motionstyle.mocap.wheel import read_wheel_pin
+from motionstyle.mocap.datasets.doors import DatasetFile, read_datasets
+from motionstyle.mocap.datasets.sheet import COLUMNS, METRES, companion_skeleton, read_sheet
+from motionstyle.mocap.datasets.wheel import read_wheel_pin
 
 ROOT = Path(__file__).parents[2]
 DATASETS = {

@@ -12,8 +12,8 @@ from test_body_fit import SKELETONS, clip_of, known_gait
 from motionstyle.body.layout import NODE_INDEX, NODES
 from motionstyle.body.rotations import exponential
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.clip import SkeletonClip, forward_kinematics
-from motionstyle.mocap.skeleton_map import (
+from motionstyle.mocap.formats.clip import SkeletonClip, forward_kinematics
+from motionstyle.mocap.skeletons.skeleton_map import (
     REQUIRED_NODES,
     check_joints,
     read_skeleton_map,

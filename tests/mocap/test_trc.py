@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from motionstyle.errors import MotionStyleError
-from motionstyle.mocap.marker_clip import MarkerClip, upright
-from motionstyle.mocap.trc import read_trc
+from motionstyle.mocap.formats.marker_clip import MarkerClip, upright
+from motionstyle.mocap.formats.trc import read_trc
 
 MIRROR = Path(__file__).parents[3] / "shared" / "mocap"
 GOOD = """\

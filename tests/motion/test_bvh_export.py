@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from motionstyle.body.kinematics import contact_points, end_points
 from motionstyle.body.layout import CONTACT_POINTS, COORDINATE_INDEX, NODES, PARENTS
 from motionstyle.body.rotations import exponential
-from motionstyle.mocap.bvh import read_bvh
+from motionstyle.mocap.formats.bvh import read_bvh
 from motionstyle.motion.bvh_export import euler_zxy, write_bvh
 
 TOLERANCE_M = 1e-8  # 10⁻⁵ mm; asked for is 1 mm

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motionstyle.spacetime.splines import BandedSystem, SplineBasis
+from motionstyle.spacetime.splines import BandedSystem, Border, SplineBasis
 
 
 @pytest.mark.parametrize("frames", [8, 31, 62])
@@ -54,3 +54,31 @@ def test_the_banded_system_is_the_dense_one():
     damping = np.full(band.shape[1], 0.3)
     expected = np.linalg.solve(dense + np.diag(damping), -whole)
     np.testing.assert_allclose(system.solve(band, gradient, damping).ravel(), expected, atol=1e-8)
+
+
+def test_bordered_variables_are_those_of_the_dense_system_and_keep_their_bounds():
+    rng = np.random.default_rng(2)
+    frames, n, further = 11, 3, 2
+    basis = SplineBasis.uniform(frames, 30.0, 2.0)
+    size = basis.controls * n
+    factors = rng.standard_normal((frames, 3 * n, 3 * n)) * np.repeat([1, 0.1, 0.01], n)
+    system = BandedSystem(basis, n)
+    gradients = rng.standard_normal((frames, 3 * n))
+    band, gradient = system.assemble(np.swapaxes(factors, 1, 2) @ factors, gradients)
+    damping = np.full(size, 0.5)
+    dense = np.diag(damping)
+    for offset in range(len(band)):
+        values = band[len(band) - 1 - offset, offset:]
+        dense += np.diag(values, offset) + (np.diag(values, -offset) if offset else 0)
+    cross = system.gather(rng.standard_normal((frames, 3 * n, further)))
+    own, pull = 1e3 * np.eye(further), rng.standard_normal(further)
+    whole = np.block([[dense, cross], [cross.T, own]])
+    expected = np.linalg.solve(whole, -np.concatenate([gradient.ravel(), pull]))
+    free = (np.full(further, -9.0), np.full(further, 9.0))
+    step, more = system.solve_bordered(band, gradient, damping, Border(cross, own, pull, free))
+    np.testing.assert_allclose(step.ravel(), expected[:size], atol=1e-8)
+    np.testing.assert_allclose(more, expected[size:], atol=1e-8)
+    none = (np.zeros(further), np.zeros(further))
+    step, more = system.solve_bordered(band, gradient, damping, Border(cross, own, pull, none))
+    assert (more == 0).all()
+    np.testing.assert_allclose(step, system.solve(band, gradient, damping), atol=1e-8)

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from motionstyle.mocap.sheet import COLUMNS
+from motionstyle.mocap.datasets.sheet import COLUMNS
 from motionstyle.tables import read_table
 
 ROOT = Path(__file__).parents[2]

@@ -11,10 +11,10 @@ import motionstyle
 from motionstyle.configuration import load_config
 from motionstyle.errors import MotionStyleError
 from motionstyle.jobs import check_writable, forget_killed_runs
-from motionstyle.mocap.doors import read_datasets
-from motionstyle.mocap.planted import read_planted
-from motionstyle.mocap.sheet import EMBEDDED, MARKER_FILES, read_sheet
-from motionstyle.mocap.wheel import read_wheel_pin
+from motionstyle.mocap.datasets.doors import read_datasets
+from motionstyle.mocap.planted.variants import read_planted
+from motionstyle.mocap.datasets.sheet import EMBEDDED, MARKER_FILES, read_sheet
+from motionstyle.mocap.datasets.wheel import read_wheel_pin
 
 ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
@@ -136,6 +136,11 @@ def companion(id, kind):
     return [source_file(CLIPS[id], name)] if name else []
 
 
+def physical_settings(id):
+    """Return the settings of a clip's physics fit."""
+    return {**CONFIG["physical"], **(CONFIG["force_plates"] if id in PLATES else {})}
+
+
 def motion_files():
     """Return the files of every motion of this run."""
     captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
@@ -148,7 +153,10 @@ def motion_files():
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
 TABLES = [
     RESULTS / f"tables/{name}.csv"
-    for name in ("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates")
+    for name in (
+        *("body", "clips", "motions", "gait_angles", "gait", "physical", "force_plates"),
+        *("joint_moments", "plate_moments", "root_residual"),
+    )
 ]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
@@ -156,9 +164,11 @@ SHOWN = {
     figure: [id for id in ids if id in CLIPS] or list(CLIPS)[:4]
     for figure, ids in CONFIG["figures"].items()
 }
-FIGURES = ["body", "strips", "gait", "markers"]
+FORCE_STRIPS = [id for id in CONFIG["figures"].get("forces", []) if id in PHYSICAL] or PHYSICAL[:4]
+FIGURES = ["body", "strips", "gait", "markers", "marker_fit"]
 FIGURES += ["planted"] if PLANTED else []
-FIGURES += ["force_plates"] if PLATES else []
+FIGURES += ["force_plates", "plate_moments"] if PLATES else []
+FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else []
 # The tables and figures of style machines are added in their rules.
 
 
@@ -168,4 +178,10 @@ def everything():
     figures = [RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")]
     quality = [RESULTS / f"quality/{id}.json" for id in CLIPS]
     sidecars = [file.with_suffix(".json") for file in motions]
-    return [*TABLES, RESULTS / "tables/claims.csv", *figures, *quality, *motions, *sidecars]
+    opensim = [
+        RESULTS / f"opensim/captured/{id}_physical_{ending}"
+        for id in PLATES
+        for ending in ("angles.mot", "moments.sto", "grf.mot", "external_loads.xml")
+    ]
+    made = [*figures, *quality, *motions, *sidecars, *opensim]
+    return [*TABLES, RESULTS / "tables/claims.csv", *made]

@@ -47,6 +47,7 @@ rule retarget:
     output:
         motion=MOTIONS / "captured/{clip}.npz",
         sidecar=MOTIONS / "captured/{clip}.json",
+        markers=RESULTS / "markers/{clip}.npz",
         quality=RESULTS / "quality/{clip}.json",
     log:
         LOGS / "retarget/{clip}.log",

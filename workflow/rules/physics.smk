@@ -1,5 +1,15 @@
 # Generated dynamics, and motions that obey Newton.
 
+from motionstyle.evaluation.force_study import read_study
+
+# Variants of the physics fit's settings, and the clips on which they are compared.
+try:
+    FORCE_STUDY = read_study(located("config/force_study.yaml"))
+except MotionStyleError as error:
+    raise WorkflowError(str(error)) from None
+STUDIED = [id for id in FORCE_STUDY["development"] if id in PLATES]
+TABLES += [RESULTS / "tables/force_plate_study.csv"] if STUDIED else []
+
 
 rule dynamics_code:
     output:
@@ -22,11 +32,13 @@ rule dynamics_code:
 rule fit_physical:
     input:
         motion=MOTIONS / "captured/{clip}.npz",
+        markers=RESULTS / "markers/{clip}.npz",
         code=RESULTS / "dynamics/library.json",
     output:
         motion=MOTIONS / "captured/{clip}_physical.npz",
         sidecar=MOTIONS / "captured/{clip}_physical.json",
         report=RESULTS / "physical/{clip}.json",
+        diagnosis=RESULTS / "diagnosis/{clip}.json",
     log:
         LOGS / "fit_physical/{clip}.log",
     benchmark:
@@ -37,7 +49,7 @@ rule fit_physical:
     resources:
         mem_mb=1500,
     params:
-        library=library("body", "motion", "dynamics", "spacetime"),
+        library=library("body", "motion", "mocap", "dynamics", "spacetime"),
         physical=lambda wildcards: {
             **CONFIG["physical"],
             **(CONFIG["force_plates"] if wildcards.clip in PLATES else {}),
@@ -121,3 +133,30 @@ rule figure_force_plates:
         library=library("evaluation", "figures"),
     script:
         "../scripts/figure_force_plates.py"
+
+
+rule force_study:
+    input:
+        motions=[MOTIONS / f"captured/{id}.npz" for id in STUDIED],
+        markers=[RESULTS / f"markers/{id}.npz" for id in STUDIED],
+        forces=[companion(id, "forces")[0] for id in STUDIED],
+        maps=[map_file(CLIPS[id]) for id in STUDIED],
+        code=RESULTS / "dynamics/library.json",
+    output:
+        table=RESULTS / "tables/force_plate_study.csv",
+    log:
+        LOGS / "force_study.log",
+    benchmark:
+        BENCHMARKS / "force_study.tsv"
+    conda:
+        "../envs/motionstyle.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+    params:
+        library=library("body", "motion", "mocap", "dynamics", "spacetime", "evaluation"),
+        study=FORCE_STUDY,
+        clips=STUDIED,
+        physical={**CONFIG["physical"], **CONFIG["force_plates"]},
+    script:
+        "../scripts/force_study.py"

@@ -146,7 +146,8 @@ rule publish:
             RESULTS / f"tables/{name}.csv"
             for name in (
                 *("body", "clips", "gait_angles", "gait", "claims"),
-                *("physical", "force_plates"),
+                *("physical", "force_plates", "joint_moments", "plate_moments", "root_residual"),
+                "benchmark_dynamics",
                 *SHMM_TABLES,
             )
         ],

@@ -1,25 +1,17 @@
 """Hold a physical motion's contact forces against its force plates."""
 
-from dataclasses import replace
-from pathlib import Path
-
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.force_plates import FootForce, force_curves, force_plate_rows
 from motionstyle.files import read_json, write_json
 from motionstyle.jobs import job
-from motionstyle.mocap.ingest_markers import placed_forces
-from motionstyle.mocap.markerset import read_marker_set
-from motionstyle.mocap.plate_feet import forces_by_foot
+from motionstyle.mocap.markers.plate_feet import plates_by_foot
 from motionstyle.motion.storage import load_motion, sidecar_path
 
 with job(snakemake.log[0]):
     given, params, id = snakemake.input, snakemake.params, snakemake.wildcards.clip
     try:
         motion = load_motion(given.motion)
-        markers = read_marker_set(Path(given.map).parent, Path(given.map).stem)
-        record = placed_forces(motion, given.forces[0], markers)
-        record = replace(record, start_s=record.start_s - motion.provenance.get("cut_start_s", 0.0))
-        feet = forces_by_foot(motion, record, markers.plates(given.forces[0]))
+        feet = plates_by_foot(motion, given.forces[0], given.map)
         plates = {
             name[0]: FootForce(feet.times, force)
             for name, force in zip(feet.names, feet.force, strict=True)

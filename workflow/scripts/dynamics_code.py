@@ -5,7 +5,7 @@ from pathlib import Path
 from motionstyle.dynamics.codegen import compile_library
 from motionstyle.dynamics.functions import dynamics_functions
 from motionstyle.jobs import job
-from motionstyle.mocap.doors import cache_folder
+from motionstyle.mocap.datasets.doors import cache_folder
 
 with job(snakemake.log[0]):
     compile_library(

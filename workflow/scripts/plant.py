@@ -4,8 +4,8 @@ from pathlib import Path
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.jobs import job
-from motionstyle.mocap.planted import read_planted
-from motionstyle.mocap.planting import plant
+from motionstyle.mocap.planted.planting import plant
+from motionstyle.mocap.planted.variants import read_planted
 from motionstyle.motion.storage import load_motion, save_failure, save_motion
 
 with job(snakemake.log[0]):

@@ -6,7 +6,7 @@ from pathlib import Path
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import atomic_write, file_sha256, write_json
 from motionstyle.jobs import job
-from motionstyle.mocap.doors import read_datasets
+from motionstyle.mocap.datasets.doors import read_datasets
 
 with job(snakemake.log[0]):
     params = snakemake.params

@@ -5,10 +5,11 @@ from pathlib import Path
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import write_json
 from motionstyle.jobs import job
-from motionstyle.mocap.ingest import ingest_clip, provenance
-from motionstyle.mocap.ingest_markers import ingest_markers
+from motionstyle.mocap.datasets.sheet import MARKER_FILES, ClipRow
+from motionstyle.mocap.markers.ingest import ingest_markers
 from motionstyle.mocap.settings import RetargetSettings
-from motionstyle.mocap.sheet import MARKER_FILES, ClipRow
+from motionstyle.mocap.skeletons.ingest import ingest_clip, provenance
+from motionstyle.motion.markers import save_markers
 from motionstyle.motion.storage import save_failure, save_motion
 
 with job(snakemake.log[0]):
@@ -34,9 +35,11 @@ with job(snakemake.log[0]):
     except MotionStyleError as error:
         print(f"failed: {error}")
         save_failure(output.motion, row.id, "captured", str(error), **provenance(row))
+        save_markers(output.markers, None)
         write_json(output.quality, {"status": "failed", "reason": str(error)})
     else:
         save_motion(output.motion, found.motion)
+        save_markers(output.markers, found.markers)
         write_json(
             output.quality,
             {"status": "ok", "report": found.report, "marker_rms_cm": found.marker_rms_cm},

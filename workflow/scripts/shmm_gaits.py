@@ -3,7 +3,7 @@
 from motionstyle.evaluation.style_machines.runs import run_gaits
 from motionstyle.evaluation.style_machines.store import load_by_id, save_outcome
 from motionstyle.jobs import job
-from motionstyle.mocap.floor import StanceThresholds
+from motionstyle.mocap.fitting.floor import StanceThresholds
 
 with job(snakemake.log[0]):
     inputs, output, params = snakemake.input, snakemake.output, snakemake.params

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from motionstyle.body.kinematics import contact_points
 from motionstyle.body.layout import CONTACT_POINTS, COORDINATE_INDEX, NODE_INDEX
-from motionstyle.mocap.floor import runs
+from motionstyle.mocap.fitting.floor import runs
 from motionstyle.motion.motion import Motion
 
 Array = NDArray[np.float64]

@@ -27,6 +27,7 @@ from motionstyle.evaluation.gait import (
 from motionstyle.motion.motion import Motion
 
 JOINT_ANGLES = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
+JOINT_MOMENTS = ("hip", "knee", "ankle")
 BAND_COLUMNS: tuple[str, ...] = (
     "id",
     "dataset",
@@ -68,14 +69,14 @@ _ACCEPTANCE = ("step_width_cm", "stance_pct", "double_support_pct", "speed_error
 
 @dataclass(frozen=True)
 class Band:
-    """An angle's published range at one instant of the cycle, in degrees."""
+    """A published range at one instant of the cycle: of an angle, deg, or a moment, N·m/kg."""
 
     low: float
     midpoint: float
     high: float
 
     def holds(self, value: float) -> bool:
-        """Return whether a value (deg) lies in the band."""
+        """Return whether a value lies in the band."""
         return self.low <= value <= self.high
 
 
@@ -83,11 +84,13 @@ class Band:
 class Normative:
     """Published values of level walking.
 
-    angles : joint angle → percent of cycle → band. acceptance : column of `GAIT_COLUMNS` → (low,
+    angles : joint angle → percent of cycle → band, deg. moments : joint → percent of cycle → band,
+    N·m/kg. acceptance : column of `GAIT_COLUMNS` → (low,
     high). neutral_styles : styles of the sheets that mean ordinary walking. source : of the angles.
     """
 
     angles: Mapping[str, Mapping[int, Band]]
+    moments: Mapping[str, Mapping[int, Band]]
     acceptance: Mapping[str, tuple[float, float]]
     neutral_styles: frozenset[str]
     source: str
@@ -103,10 +106,13 @@ def read_normative(path: str | Path) -> Normative:
     """
     try:
         data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        angles = {
-            joint: {int(pct): Band(*map(float, row)) for pct, row in data["angles"][joint].items()}
-            for joint in JOINT_ANGLES
-        }
+        angles, moments = (
+            {
+                joint: {int(pct): Band(*map(float, row)) for pct, row in data[kind][joint].items()}
+                for joint in joints
+            }
+            for kind, joints in (("angles", JOINT_ANGLES), ("moments", JOINT_MOMENTS))
+        )
         acceptance = {
             name: (float(band[0]), float(band[1]))
             for name in _ACCEPTANCE
@@ -119,14 +125,14 @@ def read_normative(path: str | Path) -> Normative:
             f"{path}: not a file of normative gait values ({error!r}); compare it with the one "
             "in the repository"
         ) from error
-    for joint, bands in angles.items():
+    for joint, bands in [*angles.items(), *moments.items()]:
         for percent, band in bands.items():
             if not band.low <= band.midpoint <= band.high or not 0 <= percent <= 100:
                 raise MotionStyleError(
                     f"{path}: {joint} at {percent} %: expected low ≤ midpoint ≤ high within "
                     f"0–100 % of the cycle, found {band.low}, {band.midpoint}, {band.high}"
                 )
-    return Normative(angles, acceptance, neutral, source)
+    return Normative(angles, moments, acceptance, neutral, source)
 
 
 def mood(motion: Motion, normative: Normative) -> str:

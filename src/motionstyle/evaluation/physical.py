@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 PHYSICAL_COLUMNS = (
-    *("id", "dataset", "config", "action", "frames", "rate_hz", "mass_kg", "mass_source"),
+    *("id", "dataset", "config", "action", "surface", "frames", "rate_hz"),
+    *("mass_kg", "mass_source"),
     *("marker_rms_cm", "root_force_rms_n", "root_moment_rms_nm", "root_force_rms_pctbw"),
-    *("root_share_of_E_pct", "foot_slip_mm", "penetration_mm"),
+    *("root_share_of_E_pct", "foot_slip_mm", "penetration_mm", "range_excess_deg"),
+    *("shoe_stiffness_npm", "shoe_rest_mm"),
     *("vertical_mean_bw", "vertical_peak_bw", "markers", "used_by_nio"),
-    *("iterations", "seconds", "succeeded", "status", "reason"),
+    *("iterations", "optimality", "seconds", "succeeded", "status", "reason"),
 )
 
 

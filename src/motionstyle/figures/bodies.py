@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,15 +18,18 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.figures.skeleton import BONES, named_points
 from motionstyle.figures.style import (
     GROUND,
+    RIGHT,
     SERIES,
     SIDE_COLOURS,
     SMALL_PT,
     TRUNK,
+    blank_figure,
     new_figure,
     styled,
 )
 
 Array = NDArray[np.float64]
+GOALS_CM = {"virtual": 1.5, "measured": 2.5}  # of a clip's rms over all markers
 GOAL_RMS_CM = 1.5
 _SIGNS = "os^Dv<>P"  # one more than colours, so that the pairs repeat late
 _CENTRAL = ("head", "thorax", "abdomen", "pelvis")
@@ -202,4 +205,49 @@ def marker_figure(marker_rms: Mapping[str, Mapping[str, float]]) -> Figure:
     axes.set_xlim(left=0)
     axes.set_xlabel("rms distance of the virtual marker from the fitted body, cm")
     figure.legend(loc="outside lower center", ncols=min(4, len(marker_rms) + 1))
+    return figure
+
+
+@styled
+def marker_fit_figure(pooled: Mapping[str, Mapping[str, Sequence[float]]]) -> Figure:
+    """Return boxes of the distance from the fitted body over clips, a box per marker place.
+
+    Boxes span the quartiles, whiskers the 5th to 95th percentile.
+
+    Parameters
+    ----------
+    pooled : kind ("measured", "virtual") → place → rms distance per clip and side, cm; see
+        `evaluation.marker_fit.pooled_distances`.
+    """
+    kinds = [
+        (kind, dict(sorted(pooled[kind].items())))
+        for kind in ("virtual", "measured")
+        if pooled.get(kind)
+    ]
+    if not kinds:
+        return blank_figure("no markers in this run")
+    tallest = max(len(places) for _kind, places in kinds)
+    figure = new_figure(1.2 + 0.155 * tallest)
+    grid = figure.subplots(1, len(kinds), squeeze=False)[0]
+    for axes, (kind, places) in zip(grid, kinds, strict=True):
+        axes.boxplot(
+            list(places.values()),
+            orientation="horizontal",
+            whis=(5, 95),
+            widths=0.6,
+            patch_artist=True,
+            showfliers=False,
+            boxprops={"facecolor": "#CCCCCC", "linewidth": 0.6},
+            medianprops={"color": RIGHT, "linewidth": 1.4},
+            whiskerprops={"linewidth": 0.6},
+            capprops={"linewidth": 0.6},
+        )
+        names = [f"{place} ({len(found)})" for place, found in places.items()]
+        axes.set_yticks(range(1, len(names) + 1), names)
+        axes.set_ylim(len(names) + 0.7, 0.3)
+        goal = GOALS_CM[kind]
+        axes.axvline(goal, color="black", linewidth=0.7, linestyle=(0, (4, 2)))
+        axes.set_xlim(left=0)
+        axes.set_title(f"{kind} (clip goal {goal:g} cm)", loc="left")
+        axes.set_xlabel("rms distance from the fitted body, cm")
     return figure

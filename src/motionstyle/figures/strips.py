@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +80,7 @@ def stick_strip(
     *,
     view: View = "side",
     title: str | None = None,
+    paths: bool = True,
 ) -> Strip:
     """Draw stick figures over time with the floor, contacts (dots) and streamers.
 
@@ -88,7 +89,7 @@ def stick_strip(
     n : number of stick figures; None lets the length of the way decide.
     view : see `skeleton.project`; the grey line is the level floor y = 0, or, in the oblique view,
         the pelvis' path on it.
-    title : by default the motion's id; planted motions are marked.
+    title : by default the motion's id; planted motions are marked. paths : draw the streamers.
 
     Figures stand where the motion was, or, if it travels less than 1.5 m, are pushed to the
     right in proportion to time. The time of each stands below it.
@@ -101,7 +102,7 @@ def stick_strip(
     strip = plan_strip(motion, flat["pelvis"][:, 0], width, n)
     flat = {name: path + np.outer(strip.shift, [1.0, 0.0]) for name, path in flat.items()}
     shown = slice(0, strip.last_frame + 1)
-    for name in STREAMER_POINTS:
+    for name in STREAMER_POINTS if paths else ():
         axes.plot(*flat[name][shown].T, color=SIDE_COLOURS[name[-1]], linewidth=0.5, alpha=0.55)
     for bone in BONES:
         lines = [np.array([flat[name][f] for name in bone.points]) for f in strip.frames]
@@ -182,6 +183,38 @@ def _label(
     axes.set_title(text, loc="left")
 
 
+def fit_strips(
+    motions: Sequence[Motion],
+    titles: Sequence[str] | None,
+    draw: Callable[[Axes, Motion, str], object],
+) -> Figure:
+    """Return a figure with one strip per motion, drawn by `draw`, all on the same scale.
+
+    Raises
+    ------
+    MotionStyleError
+        If there is no motion, or not one title for each.
+    """
+    names = [m.id for m in motions] if titles is None else list(titles)
+    if not motions or len(names) != len(motions):
+        raise MotionStyleError(f"a strip figure of {len(motions)} motions got {len(names)} titles")
+    figure = new_figure(1.0)
+    grid = figure.subplots(len(motions), 1, squeeze=False)[:, 0]
+    extents = []
+    for axes, motion, name in zip(grid, motions, names, strict=True):
+        draw(axes, motion, name)
+        extents.append((np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+    widest = max(width for width, _height in extents)
+    scale = (PRINT_WIDTH_IN - 0.7) / widest  # inches of paper per metre
+    for axes, (width, _height) in zip(grid, extents, strict=True):
+        left, right = axes.get_xlim()
+        axes.set_xlim(left, right + widest - width)
+    heights = [height * scale + 0.65 for _width, height in extents]
+    figure.set_size_inches(PRINT_WIDTH_IN, sum(heights) + 0.35)
+    grid[0].get_subplotspec().get_gridspec().set_height_ratios(heights)
+    return figure
+
+
 @styled
 def strip_figure(
     motions: Sequence[Motion],
@@ -197,23 +230,11 @@ def strip_figure(
     MotionStyleError
         If there is no motion, or not one title for each.
     """
-    names = [m.id for m in motions] if titles is None else list(titles)
-    if not motions or len(names) != len(motions):
-        raise MotionStyleError(f"a strip figure of {len(motions)} motions got {len(names)} titles")
-    figure = new_figure(1.0)
-    grid = figure.subplots(len(motions), 1, squeeze=False)[:, 0]
-    extents = []
-    for axes, motion, name in zip(grid, motions, names, strict=True):
-        stick_strip(axes, motion, n, view=view, title=name)
-        extents.append((np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
-    widest = max(width for width, _height in extents)
-    scale = (PRINT_WIDTH_IN - 0.7) / widest  # inches of paper per metre
-    for axes, (width, _height) in zip(grid, extents, strict=True):
-        left, right = axes.get_xlim()
-        axes.set_xlim(left, right + widest - width)
-    heights = [height * scale + 0.65 for _width, height in extents]
-    figure.set_size_inches(PRINT_WIDTH_IN, sum(heights) + 0.35)
-    grid[0].get_subplotspec().get_gridspec().set_height_ratios(heights)
+    figure = fit_strips(
+        motions,
+        titles,
+        lambda axes, motion, name: stick_strip(axes, motion, n, view=view, title=name),
+    )
     handles = [
         Line2D([], [], color=SIDE_COLOURS[side], linestyle=SIDE_LINES[side], label=label)
         for side, label in (("r", "right"), ("l", "left"), ("", "trunk and head"))

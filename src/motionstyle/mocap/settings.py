@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
-from motionstyle.mocap.floor import StanceThresholds
+from motionstyle.mocap.fitting.floor import StanceThresholds
 
 T = TypeVar("T")
 
@@ -17,6 +17,14 @@ def by_action(values: Mapping[str, T], action: str) -> T:
     The action "walk-turn-left" looks for "walk-turn-left", then "walk", then "default".
     """
     return values.get(action, values.get(action.split("-", maxsplit=1)[0], values["default"]))
+
+
+def of_action(section: Mapping[str, Any], action: str) -> dict[str, Any]:
+    """Return a section of the configuration with each value by action resolved for one."""
+    return {
+        name: by_action(value, action) if isinstance(value, Mapping) else value
+        for name, value in section.items()
+    }
 
 
 @dataclass(frozen=True)

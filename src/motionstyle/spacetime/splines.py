@@ -6,6 +6,7 @@ control points, so that sums of squares over frames have banded normal equations
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,6 +66,20 @@ class SplineBasis:
         return np.linalg.lstsq(stacked, wanted, rcond=None)[0]
 
 
+@dataclass(frozen=True)
+class Border:
+    """S variables beside the control points, such as the shoes.
+
+    cross : how they meet the control points in the Hessian, (K·n, S). hessian : (S, S).
+    gradient : (S,). bounds : of their step, two of (S,).
+    """
+
+    cross: Array
+    hessian: Array
+    gradient: Array
+    bounds: tuple[Array, Array]
+
+
 @dataclass
 class BandedSystem:
     """Normal equations Σ_t Φ_tᵀ H_t Φ_t x = −Σ_t Φ_tᵀ g_t over control points of n coordinates."""
@@ -97,10 +112,37 @@ class BandedSystem:
             np.add.at(gradient, basis.first + c, local[:, c])
         return band, gradient
 
+    def gather(self, cross: Array) -> Array:
+        """Return per-frame columns over (q, q̇, q̈), (F, 3n, S), over control points, (K·n, S)."""
+        basis, n, columns = self.basis, self.size, cross.shape[2]
+        local = np.einsum("fdns,fdc->fcns", cross.reshape(len(cross), 3, n, columns), basis.weights)
+        total = np.zeros((basis.controls, n, columns))
+        for c in range(4):
+            np.add.at(total, basis.first + c, local[:, c])
+        return total.reshape(-1, columns)
+
     def solve(self, band: Array, gradient: Array, damping: Array) -> Array:
         """Return −(H + diag(damping))⁻¹ g over control points (K, n)."""
+        return self._factored(band, damping)(-gradient.ravel()).reshape(gradient.shape)
+
+    def solve_bordered(
+        self, band: Array, gradient: Array, damping: Array, border: Border
+    ) -> tuple[Array, Array]:
+        """Return the step over control points (K, n) and over S further variables (S,).
+
+        The further variables are eliminated by their Schur complement and kept within bounds;
+        the control points answer to where that leaves them.
+        """
+        solve = self._factored(band, damping)
+        step, answer = solve(-gradient.ravel()), solve(border.cross)
+        own = border.hessian - border.cross.T @ answer
+        further = np.linalg.solve(own, -border.gradient - border.cross.T @ step)
+        further = np.clip(further, *border.bounds)
+        return (step - answer @ further).reshape(gradient.shape), further
+
+    def _factored(self, band: Array, damping: Array) -> Callable[[Array], Array]:
+        """Return the solver of the damped system for right-hand sides."""
         damped = band.copy()
         damped[-1] += damping
         factor = cholesky_banded(damped, check_finite=False)
-        step = cho_solve_banded((factor, False), -gradient.ravel(), check_finite=False)
-        return step.reshape(gradient.shape)
+        return lambda right: cho_solve_banded((factor, False), right, check_finite=False)

@@ -15,7 +15,7 @@ from motionstyle.evaluation.style_machines.synthesis import (
     finished,
     synthesis_row,
 )
-from motionstyle.mocap.floor import StanceThresholds
+from motionstyle.mocap.fitting.floor import StanceThresholds
 from motionstyle.motion.motion import Motion
 from motionstyle.shmm.choreography import joined, moves_of, primitives, random_walk
 from motionstyle.shmm.features import pose_channels

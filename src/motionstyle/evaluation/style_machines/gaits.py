@@ -16,7 +16,7 @@ from motionstyle.evaluation.style_machines.synthesis import (
     step_width_cm,
     synthesis_row,
 )
-from motionstyle.mocap.floor import StanceThresholds
+from motionstyle.mocap.fitting.floor import StanceThresholds
 from motionstyle.motion.motion import Motion
 from motionstyle.shmm.machine import MachineSettings, MotionMachine, learn_machine, motion_from
 from motionstyle.shmm.poses import restyled

@@ -13,7 +13,7 @@ from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.style_machines import analogies as a
 from motionstyle.evaluation.style_machines import checks, dances, driving, gaits, held_out, twins
 from motionstyle.evaluation.style_machines.settings import pattern_ids
-from motionstyle.mocap.floor import StanceThresholds
+from motionstyle.mocap.fitting.floor import StanceThresholds
 from motionstyle.motion.mirror import mirror_motion
 from motionstyle.motion.motion import Motion
 from motionstyle.shmm.machine import MachineSettings, MotionMachine, learn_machine

@@ -14,8 +14,8 @@ from motionstyle.body.ranges import joint_ranges
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.gait import foot_stances, step_widths
 from motionstyle.evaluation.style_machines.cycles import gait_numbers
-from motionstyle.mocap.contacts import detect_contacts, ground_height
-from motionstyle.mocap.floor import StanceThresholds, runs
+from motionstyle.mocap.fitting.contacts import detect_contacts, ground_height
+from motionstyle.mocap.fitting.floor import StanceThresholds, runs
 from motionstyle.motion.motion import Motion
 from motionstyle.shmm.contact_cleanup import clean_up
 

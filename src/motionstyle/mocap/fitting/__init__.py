@@ -1,0 +1,1 @@
+"""What both ways to a motion share: body, virtual markers, floor, contacts, the fit itself."""

@@ -1,0 +1,1 @@
+"""Readers of clip files: one per format, into `SkeletonClip`, `MarkerClip` or `ForceRecord`."""

@@ -1,0 +1,1 @@
+"""Variants of embedded clips, changed by known amounts."""

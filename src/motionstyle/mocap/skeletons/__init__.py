@@ -1,0 +1,1 @@
+"""From the skeleton of a file to a motion: maps, plausibility, known faults."""
