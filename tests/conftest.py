@@ -16,6 +16,9 @@ from motionstyle.body.layout import (
     NODE_INDEX,
     NODES,
 )
+from motionstyle.dynamics.codegen import FrameFunction, load_functions
+from motionstyle.dynamics.functions import dynamics_functions
+from motionstyle.dynamics.second_order import second_order_functions
 from motionstyle.motion.motion import Motion
 
 STATURE_M = 1.74
@@ -131,3 +134,9 @@ def plain_motion(plain_body: Body, standing: np.ndarray) -> Motion:
         observed=observed,
         provenance={"subject": "nobody", "action": "walk", "style": "neutral"},
     )
+
+
+@pytest.fixture(scope="session")
+def all_functions() -> dict[str, FrameFunction]:
+    """The dynamics' functions, first and second order, on CasADi's virtual machine."""
+    return load_functions(dynamics_functions, None) | load_functions(second_order_functions, None)

@@ -15,7 +15,8 @@ ROOT = Path(__file__).parents[1]
 SCHEMA = ROOT / "workflow" / "schemas" / "config.schema.json"
 NAMES = (
     *("motions.tsv", "datasets.tsv", "embedded.yaml", "claims.yaml"),
-    *("planted.yaml", "normative_gait.yaml"),
+    *("planted.yaml", "normative_gait.yaml", "syntheses.tsv"),
+    *("similarity.yaml", "adaptations.tsv"),
 )
 
 
@@ -68,8 +69,9 @@ def test_shipped_configurations_agree_with_the_schema(root):
     default = yaml.safe_load((ROOT / "config" / "config.yaml").read_text(encoding="utf-8"))
     full = yaml.safe_load((ROOT / "config" / "full.yaml").read_text(encoding="utf-8"))
     for raw in (default, {**default, **full}):
-        (root / raw["motions"]).write_text("")
-        (ROOT / raw["motions"]).resolve(strict=True)
+        for key in ("motions", "syntheses"):
+            (root / raw[key]).write_text("")
+            (ROOT / raw[key]).resolve(strict=True)
         config = load_config(raw, SCHEMA, root)
         assert {key: config[key] for key in raw} == raw
         assert config["mirrors"] == ["../shared/mocap"]

@@ -42,6 +42,11 @@ def format_cell(value: object) -> str:
     raise TypeError(f"a table cell cannot hold {type(value).__name__}")
 
 
+def plain(row: Mapping[str, object]) -> dict[str, object]:
+    """Return a row whose NumPy numbers are Python's, so that it can be written as JSON."""
+    return {k: v.item() if isinstance(v, np.generic) else v for k, v in row.items()}
+
+
 def _quoted(text: str) -> str:
     """Quote a cell that holds a comma, a quotation mark or a line break."""
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text

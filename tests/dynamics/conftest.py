@@ -9,7 +9,7 @@ from motionstyle.dynamics.functions import dynamics_functions
 
 @pytest.fixture(scope="session")
 def functions():
-    return load_functions(dynamics_functions(), None)
+    return load_functions(dynamics_functions, None)
 
 
 @pytest.fixture

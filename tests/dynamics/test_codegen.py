@@ -26,8 +26,8 @@ needs_compiler = pytest.mark.skipif(codegen.find_compiler() is None, reason="no 
 
 @needs_compiler
 def test_compiled_code_gives_what_the_virtual_machine_gives(tmp_path):
-    fast = codegen.load_functions(functions(), compiled(tmp_path, []))["small"]
-    slow = codegen.load_functions(functions(), None)["small"]
+    fast = codegen.load_functions(functions, compiled(tmp_path, []))["small"]
+    slow = codegen.load_functions(functions, None)["small"]
     assert fast.loop is not None
     assert slow.loop is None
     x, p = np.random.default_rng(0).standard_normal((7, 3)), np.array([2.0, -1.0])
@@ -40,7 +40,7 @@ def test_compiled_code_gives_what_the_virtual_machine_gives(tmp_path):
 
 @needs_compiler
 def test_parameters_may_differ_from_frame_to_frame(tmp_path):
-    fast = codegen.load_functions(functions(), compiled(tmp_path, []))["small"]
+    fast = codegen.load_functions(functions, compiled(tmp_path, []))["small"]
     x, p = np.ones((4, 3)), np.arange(8.0).reshape(4, 2)
     np.testing.assert_allclose(fast(x, p)[0][:, 1], 1 + p[:, 1])
 
@@ -60,7 +60,7 @@ def test_without_a_compiler_the_virtual_machine_serves_and_the_log_says_so(tmp_p
     where = compiled(tmp_path, log)
     assert "virtual machine" in log[0]
     assert read_json(where)["library"] is None
-    found = codegen.load_functions(functions(), where)["small"]
+    found = codegen.load_functions(functions, where)["small"]
     assert found.loop is None
     assert found(np.ones((2, 3)), np.ones(2))[0].shape == (2, 2)
 
@@ -68,7 +68,7 @@ def test_without_a_compiler_the_virtual_machine_serves_and_the_log_says_so(tmp_p
 def test_a_library_that_is_gone_is_done_without(tmp_path):
     where = tmp_path / "library.json"
     where.write_text('{"library": "/nowhere/at/all.so", "compiler": "cc"}')
-    assert codegen.load_functions(functions(), where)["small"].loop is None
+    assert codegen.load_functions(functions, where)["small"].loop is None
 
 
 def test_a_compiler_that_fails_is_named(tmp_path, monkeypatch):
@@ -78,6 +78,6 @@ def test_a_compiler_that_fails_is_named(tmp_path, monkeypatch):
 
 
 def test_arguments_of_the_wrong_shape_are_refused():
-    slow = codegen.load_functions(functions(), None)["small"]
+    slow = codegen.load_functions(functions, None)["small"]
     with pytest.raises(ValueError, match=r"small: argument 0 is \(2, 4\), expected \(2, 3\)"):
         slow(np.ones((2, 4)), np.ones(2))

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_walk import RATE, SPEED, STEP, STRIDE, WIDTH, ankle_path, make_walk
 
 from motionstyle.body.kinematics import contact_points
 from motionstyle.body.layout import (
@@ -17,6 +16,7 @@ from motionstyle.body.layout import (
 )
 from motionstyle.evaluation import gait
 from motionstyle.motion.motion import Motion
+from synthetic_walk import RATE, SPEED, STEP, STRIDE, WIDTH, ankle_path, make_walk
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic_walk import make_walk
 
 from motionstyle.body.kinematics import contact_points
 from motionstyle.body.layout import (
@@ -38,13 +37,14 @@ from motionstyle.evaluation.normative import read_normative
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.opensim_export import BALL_JOINTS, PELVIS, opensim_angles
 from motionstyle.spacetime.splines import SplineBasis
+from synthetic_walk import make_walk
 
 NORMATIVE = read_normative(Path(__file__).parents[2] / "config" / "normative_gait.yaml")
 
 
 @pytest.fixture(scope="module")
 def functions():
-    return load_functions(dynamics_functions(), None)
+    return load_functions(dynamics_functions, None)
 
 
 def make_still(body, standing, forces):

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from synthetic_walk import make_walk
 
 from motionstyle.body.layout import CONTACT_POINTS, COORDINATE_INDEX
 from motionstyle.errors import MotionStyleError
@@ -23,6 +22,7 @@ from motionstyle.evaluation.normative import (
     read_normative,
 )
 from motionstyle.tables import format_cell
+from synthetic_walk import make_walk
 
 CONFIG = Path(__file__).parents[2] / "config" / "normative_gait.yaml"
 

@@ -19,7 +19,7 @@ from motionstyle.evaluation.root_residual import (
 
 @pytest.fixture(scope="module")
 def functions():
-    return load_functions(dynamics_functions(), None)
+    return load_functions(dynamics_functions, None)
 
 
 @pytest.fixture

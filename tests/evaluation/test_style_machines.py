@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_walk import RATE, SPEED, STEP, STRIDE, WIDTH, make_walk
 
 from motionstyle.body.layout import COORDINATE_INDEX
 from motionstyle.errors import MotionStyleError
@@ -25,6 +24,7 @@ from motionstyle.mocap.fitting.floor import StanceThresholds
 from motionstyle.shmm.features import coordinates_of
 from motionstyle.shmm.machine import MachineSettings, learn_machine
 from motionstyle.shmm.schedule import Schedule
+from synthetic_walk import RATE, SPEED, STEP, STRIDE, WIDTH, make_walk
 
 LIGHT = MachineSettings(
     states=14,

@@ -164,6 +164,21 @@ def test_contacts_are_dots_at_the_bearing_points_of_the_drawn_frames(plain_motio
         assert dots[SIDE_COLOURS[side]] == bearing[:, own].sum() > 0
 
 
+def test_forces_are_arrows_from_the_foot_of_half_a_metre_a_body_weight(plain_motion):
+    axes = new_figure(2.0).subplots()
+    strip = stick_strip(axes, plain_motion, 3, forces=True)
+    arrows = [t for t in axes.texts if t.get_text() == ""]
+    feet = [slice(0, 4), slice(4, 8)]
+    down = sum(plain_motion.contacts[f, foot].any() for f in strip.frames for foot in feet)
+    assert len(arrows) == down
+    rises = sum(arrow.xy[1] - arrow.xyann[1] for arrow in arrows)
+    vertical = plain_motion.contact_forces[list(strip.frames), :, 1].sum()
+    assert rises == pytest.approx(0.5 * vertical / (plain_motion.body.mass * 9.81))
+    without = new_figure(2.0).subplots()
+    stick_strip(without, replace(plain_motion, contact_forces=None), 3, forces=True)
+    assert all(t.get_text() for t in without.texts)
+
+
 def test_sides_differ_in_colour_and_in_line_style():
     assert SIDE_COLOURS["r"] != SIDE_COLOURS["l"]
     assert SIDE_LINES["r"] != SIDE_LINES["l"]

@@ -36,7 +36,7 @@ def test_opensim_finds_the_same_moments(plain_motion, tmp_path):
     forces = plain_motion.contact_forces.copy()
     forces[:, toes] = 0.0  # external loads act on the hind foot
     motion = replace(plain_motion, contact_forces=forces)
-    functions = load_functions(dynamics_functions(), None)
+    functions = load_functions(dynamics_functions, None)
     ours, times = joint_loads(motion, functions).columns(), motion.times
     angles, reactions = opensim_angles(motion), ground_reactions(motion)
     write_storage(tmp_path / "angles.mot", "made", times, angles, in_degrees=True)

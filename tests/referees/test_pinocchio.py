@@ -13,7 +13,7 @@ pin = pytest.importorskip("pinocchio")
 
 
 def test_forces_equal_pinocchio(plain_body):
-    functions = load_functions(dynamics_functions(), None)
+    functions = load_functions(dynamics_functions, None)
     model, _ = pinocchio_model(pin, plain_body)
     np.testing.assert_array_equal(model.gravity.linear, [0, -9.81, 0])
     data = model.createData()
@@ -30,7 +30,7 @@ def test_forces_equal_pinocchio(plain_body):
 
 
 def test_contact_forces_equal_pinocchio(plain_body):
-    functions = load_functions(dynamics_functions(), None)
+    functions = load_functions(dynamics_functions, None)
     model, last = pinocchio_model(pin, plain_body)
     data = model.createData()
     rng = np.random.default_rng(12)

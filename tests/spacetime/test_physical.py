@@ -21,7 +21,7 @@ from motionstyle.spacetime.physical_problem import PhysicalSettings
 
 @pytest.fixture(scope="module")
 def functions():
-    return load_functions(dynamics_functions(), None)
+    return load_functions(dynamics_functions, None)
 
 
 def silent(_text):

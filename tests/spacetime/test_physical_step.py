@@ -24,7 +24,7 @@ from motionstyle.spacetime.physical_step import (
 
 @pytest.fixture(scope="module")
 def functions():
-    return load_functions(dynamics_functions(), None)
+    return load_functions(dynamics_functions, None)
 
 
 def shifting(body, frames=12):

@@ -119,3 +119,11 @@ def test_snakefmt_changes_nothing():
     command = [sys.executable, "-m", "snakefmt", "--check", "Snakefile", "workflow"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_physics_fit_reruns_for_every_module_of_its_room_that_it_imports():
+    text = (ROOT / "workflow/rules/common.smk").read_text(encoding="utf-8")
+    listed = set(re.findall(r'"(\w+)"', text.split("PHYSICAL_MODULES = [")[1].split("]")[0]))
+    for name in listed:
+        module = (ROOT / f"src/motionstyle/spacetime/{name}.py").read_text(encoding="utf-8")
+        assert set(re.findall(r"from motionstyle\.spacetime\.(\w+) import", module)) <= listed

@@ -6,6 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
 
 import motionstyle
 from motionstyle.configuration import load_config
@@ -15,12 +16,16 @@ from motionstyle.mocap.datasets.doors import read_datasets
 from motionstyle.mocap.planted.variants import read_planted
 from motionstyle.mocap.datasets.sheet import EMBEDDED, MARKER_FILES, read_sheet
 from motionstyle.mocap.datasets.wheel import read_wheel_pin
+from motionstyle.spacetime.synthesis_sheet import read_syntheses
+from motionstyle.similarity.settings import read_settings
+from motionstyle.similarity.tasks import read_tasks
 
 ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
 PATH_KEYS = (
     *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
-    *("planted", "normative", "style_machines"),
+    *("planted", "normative", "syntheses", "similarity", "adaptations"),
+    "style_machines",
 )
 
 
@@ -56,8 +61,40 @@ try:
         for recipe in read_planted(CONFIG["planted"])
         if recipe.base in CLIPS and CLIPS[recipe.base].dataset == EMBEDDED
     }
+    # Motions are synthesised from clips of the sheet. Of the sheets that are shipped, rows whose
+    # clips it has not are left out; in the user's own they are mistakes.
+    SHIPPED = Path(CONFIG["syntheses"]).resolve().parent == (ROOT / "config").resolve()
+    SYNTHESES = {
+        row.id: row
+        for row in read_syntheses(CONFIG["syntheses"], None if SHIPPED else CLIPS)
+        if all(id in CLIPS for id in (*row.clips, *row.others))
+    }
+    SIMILARITY = read_settings(
+        CONFIG["similarity"], ROOT / "workflow/schemas/similarity.schema.json"
+    )
+    TASKS = {task.task: task for task in read_tasks(CONFIG["adaptations"], set(CLIPS))}
 except MotionStyleError as error:
     raise WorkflowError(str(error)) from None
+
+# The first synthesis of each task, for figures.
+ONE_OF_EACH_TASK = list({row.task: row.id for row in reversed(SYNTHESES.values())}.values())[::-1]
+# Syntheses on which solver designs are held against each other.
+COMPARED = [id for id in CONFIG["solver_comparison"]["problems"] if id in SYNTHESES]
+# Syntheses on a ramp, each with the one on the level in the same style and window.
+RAMPS = [
+    (ramp.id, level.id)
+    for ramp in SYNTHESES.values()
+    for level in SYNTHESES.values()
+    if ramp.footprints.kind == "ramp"
+    and level.task == "same_footprints"
+    and ramp.style == level.style
+    and (ramp.example, ramp.first_frame, ramp.last_frame)
+    == (level.example, level.first_frame, level.last_frame)
+]
+if workflow.is_main_process:
+    LEFT_OUT = [row.id for row in read_syntheses(CONFIG["syntheses"]) if row.id not in SYNTHESES]
+    if LEFT_OUT:
+        logger.info(f"syntheses left out, clips not in {CONFIG['motions']}: {', '.join(LEFT_OUT)}")
 
 # Kept open while this run lasts: a run that was killed leaves locks, which the next one removes.
 ALIVE = forget_killed_runs(".snakemake") if workflow.is_main_process else None
@@ -74,27 +111,56 @@ PLATES = [id for id, row in CLIPS.items() if row.forces and "force_plates" in ro
 PHYSICAL = [
     id
     for id, row in CLIPS.items()
-    if row.level == "physical" or "nio" in row.experiments or id in PLATES
+    if row.level == "physical"
+    or "nio" in row.experiments
+    or id in PLATES
+    or any(id in synthesis.clips for synthesis in SYNTHESES.values())
 ]
+
+# Motions that similar pairs are made of. Planted variants stand in for the embedded clips, whose
+# frames they share.
+SIMILAR = [
+    *(
+        f"captured/{id}"
+        for id, row in CLIPS.items()
+        if "similarity" in row.experiments and row.dataset != EMBEDDED
+    ),
+    *(f"planted/{id}" for id, recipe in PLANTED.items() if "similarity" in recipe.experiments),
+]
+TASKS = TASKS if SIMILAR else {}
+ADAPTED = [f"{task}{variant}" for task in TASKS for variant in ("", "_without_style")]
 
 
 wildcard_constraints:
+    task="|".join(TASKS) or "none",
     clip="|".join(CLIPS) or "none",
     planted="|".join(PLANTED) or "none",
+    synthesis="|".join(SYNTHESES) or "none",
+
+
+# What the physics fit is made of in its room: other modules there do not touch it.
+PHYSICAL_MODULES = [
+    f"spacetime/{name}.py"
+    for name in (
+        *("physical", "physical_problem", "physical_step", "ground", "sharing", "diagnosis"),
+        *("forces", "splines"),
+    )
+]
 
 
 @cache
 def room_digest(room):
-    """Return a digest of the sources of one room of the package."""
+    """Return a digest of the sources of one room, or one module, of the package."""
     digest = sha256()
-    for file in sorted(f for f in (PACKAGE / room).rglob("*") if f.suffix in {".py", ".j2"}):
+    files = [PACKAGE / room] if room.endswith(".py") else (PACKAGE / room).rglob("*")
+    for file in sorted(f for f in files if f.suffix in {".py", ".j2"}):
         if room or file.parent == PACKAGE:
             digest.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
     return digest.hexdigest()
 
 
 def library(*rooms):
-    """Return a digest of the package's sources in these rooms, as a parameter of a rule.
+    """Return a digest of the package's sources in these rooms or modules, for a rule's parameters.
 
     Snakemake reruns a job whose parameters changed, so an edit reruns what it touches.
     """
@@ -141,13 +207,37 @@ def physical_settings(id):
     return {**CONFIG["physical"], **(CONFIG["force_plates"] if id in PLATES else {})}
 
 
+def synthesis_motions(row):
+    """Return the physical motions a synthesis is made from, by name of the input."""
+    files = {"example": MOTIONS / f"captured/{row.example}_physical.npz"}
+    if row.footprint_clip not in ("", row.example):
+        files["source"] = MOTIONS / f"captured/{row.footprint_clip}_physical.npz"
+    if row.footprints.kind == "file":
+        files["file"] = row.folder / row.footprints.text("path")
+    return files
+
+
+def synthesis_text(id):
+    """Return what a synthesis depends on, as text: a change makes it anew."""
+    row = SYNTHESES[id]
+    return repr([getattr(row, name) for name in vars(row) if name not in ("row", "note")])
+
+
 def motion_files():
     """Return the files of every motion of this run."""
     captured = [MOTIONS / "captured" / f"{id}.npz" for id in [*CLIPS, *MIRRORED]]
     captured += [MOTIONS / "captured" / f"{id}_physical.npz" for id in PHYSICAL]
-    planted = [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
-    synthesised = [file for job in SHMM_MADE for file in shmm_motions(job)]
-    return captured + planted + synthesised
+    captured += [MOTIONS / f"{kind}/{id}.npz" for id in SYNTHESES for kind in ("nio", "warp")]
+    captured += [MOTIONS / f"warp/{id}_copied.npz" for id in SYNTHESES]
+    captured += [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    captured += [file for job in SHMM_MADE for file in shmm_motions(job)]
+    return captured + [MOTIONS / "adapted" / f"{id}.npz" for id in ADAPTED]
+
+
+def made_motions():
+    """Return the motions of the kinds that are judged against their example."""
+    kinds = SIMILARITY["judge"]["kinds"]
+    return [file for file in motion_files() if file.parent.name in kinds]
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
@@ -158,6 +248,15 @@ TABLES = [
         *("joint_moments", "plate_moments", "root_residual"),
     )
 ]
+TABLES += [
+    RESULTS / f"tables/{name}.csv" for name in ("syntheses", "ramp_gait", "solver_comparison")
+]
+
+SIMILARITY_TABLES = [
+    *("similarity_alignments", "similarity_sets", "leg_subspaces", "leakage", "one_class_svm"),
+    *("discrimination", "dose_response", "dose_points", "adaptations", "style_judgement"),
+]
+TABLES += [RESULTS / f"tables/{name}.csv" for name in SIMILARITY_TABLES if SIMILAR]
 
 # Clips shown in the figures: those of the sheet among the configured ones, in this order.
 SHOWN = {
@@ -170,6 +269,11 @@ FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates", "plate_moments"] if PLATES else []
 FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else []
 # The tables and figures of style machines are added in their rules.
+FIGURES += ["syntheses", "warps"] if SYNTHESES else []
+FIGURES += ["solvers"] if COMPARED else []
+FIGURES += ["similarity_features", "leg_subspaces", "leakage", "discrimination"] if SIMILAR else []
+FIGURES += ["dose_response"] if SIMILAR and PLANTED else []
+FIGURES += ["adaptation_triptych", "adaptation_strips"] if TASKS else []
 
 
 def everything():
@@ -183,5 +287,10 @@ def everything():
         for id in PLATES
         for ending in ("angles.mot", "moments.sto", "grf.mot", "external_loads.xml")
     ]
-    made = [*figures, *quality, *motions, *sidecars, *opensim]
+    footprints = [
+        RESULTS / f"footprints/{id}.{kind}"
+        for id in SYNTHESES
+        for kind in ("tsv", "json", "svg", "png")
+    ]
+    made = [*figures, *quality, *motions, *sidecars, *opensim, *footprints]
     return [*TABLES, RESULTS / "tables/claims.csv", *made]

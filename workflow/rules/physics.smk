@@ -14,6 +14,7 @@ TABLES += [RESULTS / "tables/force_plate_study.csv"] if STUDIED else []
 rule dynamics_code:
     output:
         library=RESULTS / "dynamics/library.json",
+        second_order=RESULTS / "dynamics/second_order.json",
     log:
         LOGS / "dynamics_code.log",
     benchmark:
@@ -22,7 +23,7 @@ rule dynamics_code:
         "../envs/motionstyle.yaml"
     threads: 1
     resources:
-        mem_mb=2500,
+        mem_mb=3000,
     params:
         library=library("body", "dynamics"),
     script:
@@ -49,7 +50,7 @@ rule fit_physical:
     resources:
         mem_mb=1500,
     params:
-        library=library("body", "motion", "mocap", "dynamics", "spacetime"),
+        library=library("body", "motion", "mocap/settings.py", "dynamics", *PHYSICAL_MODULES),
         physical=lambda wildcards: {
             **CONFIG["physical"],
             **(CONFIG["force_plates"] if wildcards.clip in PLATES else {}),

@@ -149,6 +149,7 @@ rule publish:
                 *("physical", "force_plates", "joint_moments", "plate_moments", "root_residual"),
                 "benchmark_dynamics",
                 *SHMM_TABLES,
+                *(SIMILARITY_TABLES if SIMILAR else ()),
             )
         ],
         figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],

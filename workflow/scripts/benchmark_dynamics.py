@@ -11,9 +11,7 @@ from motionstyle.tables import write_table
 
 with job(snakemake.log[0]):
     body = load_available(snakemake.input.motions)[0].body
-    both = [
-        load_functions(dynamics_functions(), code) for code in (Path(snakemake.input.code), None)
-    ]
+    both = [load_functions(dynamics_functions, code) for code in (Path(snakemake.input.code), None)]
     rows = benchmark_dynamics(body, *both, **snakemake.params.sizes)
     for row in rows:
         print(row)

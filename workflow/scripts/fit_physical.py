@@ -21,7 +21,7 @@ with job(snakemake.log[0]):
         physical = of_action(physical, motion.provenance.get("action", ""))
         motion = prepare(motion, physical)
         markers = prepare_markers(load_markers(given.markers), motion)
-        functions = load_functions(dynamics_functions(), Path(given.code))
+        functions = load_functions(dynamics_functions, Path(given.code))
         found = fit_physical(motion, functions, settings_from(physical), markers=markers)
         if found.motion is None:
             raise MotionStyleError(f"the physics fit broke down: {found.report['reason']}")

@@ -17,7 +17,7 @@ from motionstyle.tables import write_table
 
 with job(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    functions = load_functions(dynamics_functions(), Path(given.code))
+    functions = load_functions(dynamics_functions, Path(given.code))
     rows = []
     for name, changes in variants(params.study):
         for k, id in enumerate(params.clips):

@@ -26,7 +26,7 @@ from motionstyle.tables import write_table
 with job(snakemake.log[0]):
     params, output = snakemake.params, snakemake.output
     normative = read_normative(snakemake.input.normative)
-    functions = load_functions(dynamics_functions(), Path(snakemake.input.code))
+    functions = load_functions(dynamics_functions, Path(snakemake.input.code))
     moments, plates, cycles, stances = [], [], {}, {}
     for motion in load_available(snakemake.input.motions, allow_none=True):
         id = motion.provenance["example"]

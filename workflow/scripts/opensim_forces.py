@@ -28,7 +28,7 @@ with job(snakemake.log[0]):
             write_no_motion(file, str(error))
     else:
         forces, times = ground_reactions(motion), motion.times
-        functions = load_functions(dynamics_functions(), Path(snakemake.input.code))
+        functions = load_functions(dynamics_functions, Path(snakemake.input.code))
         moments = joint_loads(motion, functions).columns()
         write_storage(output.moments, motion.id, times, moments, in_degrees=False)
         write_storage(output.forces, motion.id, times, forces, in_degrees=False)

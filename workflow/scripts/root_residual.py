@@ -13,7 +13,7 @@ from motionstyle.tables import write_table
 
 with job(snakemake.log[0]):
     given, params = snakemake.input, snakemake.params
-    functions = load_functions(dynamics_functions(), Path(given.code))
+    functions = load_functions(dynamics_functions, Path(given.code))
     rows = []
     for before, after, file in zip(given.kinematic, given.physical, given.reports, strict=True):
         id, report = Path(before).stem, read_json(file)

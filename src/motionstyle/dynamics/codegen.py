@@ -13,7 +13,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
 
@@ -61,7 +61,11 @@ def generate_source(functions: Sequence[ca.Function]) -> str:
 
 
 def compile_library(
-    functions: Sequence[ca.Function], destination: Path, cache: Path, log: Callable[[str], None]
+    functions: Sequence[ca.Function],
+    destination: Path,
+    cache: Path,
+    log: Callable[[str], None],
+    flags: Sequence[str] = FLAGS,
 ) -> None:
     """Write `destination`, a JSON file that says where the compiled functions are, if anywhere.
 
@@ -69,6 +73,7 @@ def compile_library(
     ----------
     functions : to be compiled. cache : folder that keeps libraries by digest.
     log : told whether a library was found, built, or is done without.
+    flags : of the compiler.
 
     Raises
     ------
@@ -79,23 +84,23 @@ def compile_library(
     compiler = find_compiler()
     if compiler is None:
         log("no C compiler found: the virtual machine serves, some 20 times slower")
-        write_json(destination, {"library": None, "compiler": None})
+        write_json(destination, {"library": None, "compiler": None, "functions": {}})
         return
     version = subprocess.run(
         [compiler, "-march=native", "-Q", "--help=target", "--version"],
         capture_output=True, text=True, check=False,
     ).stdout  # fmt: skip
-    digest = sha256("\0".join([source, version, *FLAGS]).encode()).hexdigest()
+    digest = sha256("\0".join([source, version, *flags]).encode()).hexdigest()
     library = cache / "code" / f"{digest[:32]}.so"
     if library.exists():
         log(f"compiled before: {library.name}")
     else:
-        log(f"compiling {len(source) / 1e6:.1f} MB of C with {compiler} {' '.join(FLAGS)}")
+        log(f"compiling {len(source) / 1e6:.1f} MB of C with {compiler} {' '.join(flags)}")
         with tempfile.TemporaryDirectory() as folder:
             file, built = Path(folder) / "functions.c", Path(folder) / "functions.so"
             file.write_text(source, encoding="utf-8")
             done = subprocess.run(
-                [compiler, *FLAGS, str(file), "-o", str(built), "-lm"],
+                [compiler, *flags, str(file), "-o", str(built), "-lm"],
                 capture_output=True, text=True, check=False,
             )  # fmt: skip
             if done.returncode:
@@ -107,43 +112,71 @@ def compile_library(
                 handle.write(built.read_bytes())
         library.chmod(0o755)
         log(f"built {library.name}")
-    write_json(destination, {"library": str(library), "compiler": compiler})
+    signatures = {function.name(): asdict(Signature.of(function)) for function in functions}
+    write_json(
+        destination, {"library": str(library), "compiler": compiler, "functions": signatures}
+    )
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What a caller must know of a function: sizes of its arguments, results and work space.
+
+    inputs : nonzeros of each argument. rows, columns : of the nonzeros of each result.
+    """
+
+    name: str
+    inputs: list[int]
+    rows: list[list[int]]
+    columns: list[list[int]]
+    integers: int
+    reals: int
+
+    @staticmethod
+    def of(function: ca.Function) -> Signature:
+        """Return the signature of a CasADi function."""
+        triplets = [function.sparsity_out(k).get_triplet() for k in range(function.n_out())]
+        return Signature(
+            str(function.name()),
+            [function.nnz_in(i) for i in range(function.n_in())],
+            [list(rows) for rows, _columns in triplets],
+            [list(columns) for _rows, columns in triplets],
+            max(1, function.sz_iw()),
+            max(1, function.sz_w()),
+        )
 
 
 @dataclass(frozen=True)
 class FrameFunction:
-    """A function of one frame that is called on many.
+    """A function of one frame that is called on many; arrays come back as (F, nonzeros).
 
-    sparsities : of the outputs, as (rows, columns) of their nonzeros; arrays come back as
-    (F, nonzeros).
+    loop : the compiled loop over frames, or None. function : for the virtual machine, where
+    there is no loop.
     """
 
-    function: ca.Function
+    signature: Signature
     loop: Callable[..., int] | None
+    function: ca.Function | None = None
 
     @property
     def name(self) -> str:
         """Name of the function."""
-        return str(self.function.name())
+        return self.signature.name
 
     def pattern(self, output: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return rows and columns of an output's nonzeros, in the order they come back."""
-        sparsity = self.function.sparsity_out(output)
-        rows, columns = sparsity.get_triplet()
+        rows, columns = self.signature.rows[output], self.signature.columns[output]
         return np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64)
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """Evaluate on arguments (F, n) or, the same for all frames, (n,)."""
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in arguments]
         frames = next(len(a) for a in arrays if a.ndim == 2)
-        sizes = [self.function.nnz_in(i) for i in range(self.function.n_in())]
-        for i, (array, size) in enumerate(zip(arrays, sizes, strict=True)):
+        for i, (array, size) in enumerate(zip(arrays, self.signature.inputs, strict=True)):
             if array.shape not in {(size,), (frames, size)}:
                 wanted = f"({frames}, {size})"
                 raise ValueError(f"{self.name}: argument {i} is {array.shape}, expected {wanted}")
-        results = [
-            np.zeros((frames, self.function.nnz_out(k))) for k in range(self.function.n_out())
-        ]
+        results = [np.zeros((frames, len(rows))) for rows in self.signature.rows]
         if self.loop is None:
             self._interpret(arrays, results, frames)
         else:
@@ -159,8 +192,8 @@ class FrameFunction:
             kind = ctypes.c_ssize_t * len(items)
             return kind(*(item.shape[1] if item.ndim == 2 else 0 for item in items))
 
-        integers = np.zeros(max(1, self.function.sz_iw()), dtype=np.int64)
-        reals = np.zeros(max(1, self.function.sz_w()))
+        integers = np.zeros(self.signature.integers, dtype=np.int64)
+        reals = np.zeros(self.signature.reals)
         flag = self.loop(
             ctypes.c_ssize_t(frames),
             pointers(arrays),
@@ -184,19 +217,22 @@ class FrameFunction:
 
 
 def load_functions(
-    functions: Sequence[ca.Function], description: Path | None
+    build: Callable[[], Sequence[ca.Function]], description: Path | None
 ) -> dict[str, FrameFunction]:
     """Return the functions by name, compiled if `description` names a library that exists.
 
     Parameters
     ----------
-    functions : the same as were compiled.
+    build : returns the functions that were compiled; called only where there is no library,
+        since the symbolic work takes seconds.
     description : what `compile_library` wrote, or None for the virtual machine.
     """
-    where = read_json(description)["library"] if description else None
-    library = ctypes.CDLL(where) if where and Path(where).exists() else None
-    found = {}
-    for function in functions:
-        loop = getattr(library, f"{function.name()}_frames") if library else None
-        found[function.name()] = FrameFunction(function, loop)
-    return found
+    known = read_json(description) if description else {"library": None}
+    where = known["library"]
+    if where and Path(where).exists():
+        library = ctypes.CDLL(where)
+        return {
+            name: FrameFunction(Signature(**fields), getattr(library, f"{name}_frames"))
+            for name, fields in known["functions"].items()
+        }
+    return {f.name(): FrameFunction(Signature.of(f), None, f) for f in build()}

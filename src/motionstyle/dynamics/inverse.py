@@ -123,10 +123,7 @@ def inverse_dynamics(
 ) -> InverseDynamics:
     """Return inverse dynamics for symbols q, q̇, q̈ (35) and contact forces f (24, world, N)."""
     nodes, turns, joints = _motion(q, qd, qdd, body)
-    points = [
-        nodes[n].place + nodes[n].rotation @ body.points[k]
-        for k, n in enumerate(CONTACT_POINT_NODES)
-    ]
+    points = _points(nodes, body)
     trees = _subtrees(nodes, points, f, body)
     phi = _turn_forces(nodes, turns, trees)
     k_phi, k_u, k_d = _turn_jacobians(nodes, turns, trees, qdd)
@@ -139,6 +136,28 @@ def inverse_dynamics(
         by_qdd=g.T @ (k_d @ g),
         by_force=g.T @ _by_force(nodes, turns, points),
     )
+
+
+def inverse_forces(q: ca.SX, qd: ca.SX, qdd: ca.SX, f: ca.SX, body: BodyParameters) -> ca.SX:
+    """Return τ (35) of `InverseDynamics` alone, for automatic differentiation."""
+    nodes, turns, joints = _motion(q, qd, qdd, body)
+    trees = _subtrees(nodes, _points(nodes, body), f, body)
+    return joints.g.T @ _turn_forces(nodes, turns, trees)
+
+
+def foot_points(q: ca.SX, body: BodyParameters) -> ca.SX:
+    """Return the eight foot points in the world, m, (24); `inverse_dynamics` leaves out q[:3]."""
+    still = ca.SX.zeros(COUNT)
+    nodes, _turns, _joints = _motion(q, still, still, body)
+    return ca.vertcat(*(q[:3] + point for point in _points(nodes, body)))
+
+
+def _points(nodes: list[_Node], body: BodyParameters) -> list[ca.SX]:
+    """Return the foot points relative to the pelvis' position."""
+    return [
+        nodes[n].place + nodes[n].rotation @ body.points[k]
+        for k, n in enumerate(CONTACT_POINT_NODES)
+    ]
 
 
 def _hinge(axis: np.ndarray, angle: ca.SX) -> ca.SX:

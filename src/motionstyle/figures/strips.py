@@ -34,6 +34,8 @@ SPACING_SHARE, SPACING_M = 0.55, 0.45
 IN_TIME_SPACING_M = 0.6
 LONGEST_M = 6.6  # of travel drawn; what comes later is left out and the title says so
 HARDLY_TRAVELS_M = 1.5  # below this the figures are pushed apart with time
+FORCE_SCALE_M = 0.5  # length of an arrow of one body weight
+GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,7 @@ def stick_strip(
     view: View = "side",
     title: str | None = None,
     paths: bool = True,
+    forces: bool = False,
 ) -> Strip:
     """Draw stick figures over time with the floor, contacts (dots) and streamers.
 
@@ -90,14 +93,17 @@ def stick_strip(
     view : see `skeleton.project`; the grey line is the level floor y = 0, or, in the oblique view,
         the pelvis' path on it.
     title : by default the motion's id; planted motions are marked. paths : draw the streamers.
+    forces : draw each foot's contact force, where known, from its centre of pressure.
 
     Figures stand where the motion was, or, if it travels less than 1.5 m, are pushed to the
     right in proportion to time. The time of each stands below it.
     """
     points = named_points(motion.body, motion.coordinates)
     points["ground"] = points["pelvis"] * [1, 0, 1]
+    arrows = _force_arrows(motion, points) if forces else {}
+    points |= arrows
     flat = project(motion, points, view)
-    places = np.stack([path[:, 0] for name, path in flat.items()])
+    places = np.stack([path[:, 0] for name, path in flat.items() if name not in arrows])
     width = float(np.median(np.ptp(places, axis=0)))
     strip = plan_strip(motion, flat["pelvis"][:, 0], width, n)
     flat = {name: path + np.outer(strip.shift, [1.0, 0.0]) for name, path in flat.items()}
@@ -125,8 +131,33 @@ def stick_strip(
             spots = [flat[name][f] for name in touching if name.endswith(f"_{side}")]
             if spots:
                 axes.plot(*np.array(spots).T, "o", color=SIDE_COLOURS[side], markersize=2.6)
+    for side in "lr" if arrows else "":
+        for f in strip.frames:
+            foot, tip = flat[f"pressure_{side}"][f], flat[f"force_{side}"][f]
+            if np.linalg.norm(tip - foot) > 0.02:
+                look = {"arrowstyle": "-|>", "color": SIDE_COLOURS[side], "lw": 0.8}
+                look |= {"mutation_scale": 5, "shrinkA": 0, "shrinkB": 0}
+                axes.annotate("", tip, foot, arrowprops=look, zorder=3)
+    flat = {name: path for name, path in flat.items() if name not in arrows}
     _label(axes, motion, strip, flat, view=view, title=title)
     return strip
+
+
+def _force_arrows(motion: Motion, points: dict[str, Array]) -> dict[str, Array]:
+    """Return paths (F, 3) of each foot's centre of pressure and of the tip of its force's arrow."""
+    if motion.contact_forces is None:
+        return {}
+    arrows = {}
+    places = np.stack([points[name] for name in CONTACT_POINTS], axis=1)
+    per_newton = FORCE_SCALE_M / (motion.body.mass * GRAVITY)
+    for side in "rl":
+        own = [k for k, name in enumerate(CONTACT_POINTS) if name.endswith(f"_{side}")]
+        pushes = motion.contact_forces[:, own]
+        weights = np.maximum((pushes * motion.contact_normals[:, own]).sum(axis=-1), 0) + 1e-9
+        middle = (weights[..., None] * places[:, own]).sum(axis=1) / weights.sum(axis=1)[:, None]
+        arrows[f"pressure_{side}"] = middle
+        arrows[f"force_{side}"] = middle + per_newton * pushes.sum(axis=1)
+    return arrows
 
 
 def _head(neck: Array, top: Array, length: float) -> Array:
@@ -222,8 +253,11 @@ def strip_figure(
     *,
     view: View = "side",
     n: int | None = None,
+    forces: bool = False,
 ) -> Figure:
     """Return a figure with one strip per motion, one above the other on the same scale.
+
+    forces : draw contact forces, where known; an arrow of half a metre is one body weight.
 
     Raises
     ------
@@ -233,7 +267,9 @@ def strip_figure(
     figure = fit_strips(
         motions,
         titles,
-        lambda axes, motion, name: stick_strip(axes, motion, n, view=view, title=name),
+        lambda axes, motion, name: stick_strip(
+            axes, motion, n, view=view, title=name, forces=forces
+        ),
     )
     handles = [
         Line2D([], [], color=SIDE_COLOURS[side], linestyle=SIDE_LINES[side], label=label)
@@ -245,5 +281,9 @@ def strip_figure(
     handles.append(
         Line2D([], [], color=GROUND, linewidth=0.5, label="path of hand or ball of the foot")
     )
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, handlelength=2.4)
+    if forces:
+        text = f"arrow: contact force, {FORCE_SCALE_M:g} m for one body weight"
+        handles.append(Line2D([], [], color=GROUND, marker="^", linestyle="", ms=4, label=text))
+    columns = 3 if forces else 5
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, handlelength=2.4)
     return figure

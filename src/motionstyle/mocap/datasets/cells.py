@@ -1,12 +1,14 @@
-"""Typed values out of the text cells of one table row, with a note of everything wrong."""
+"""Lines of sheets, and typed values out of their cells, with a note of everything wrong."""
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
-from motionstyle.errors import near_matches
+from motionstyle.errors import MotionStyleError, near_matches
 
 _RESERVED = {"CON", "PRN", "AUX", "NUL", *(f"{p}{n}" for p in ("COM", "LPT") for n in range(1, 10))}
 
@@ -101,3 +103,43 @@ def finite(value: str) -> float | None:
     except ValueError:
         return None
     return number if math.isfinite(number) else None
+
+
+def sheet_lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Return (line number, cells) of every line that is neither empty nor a comment."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MotionStyleError(
+            f"{path}: the sheet is not UTF-8 text (byte {error.start + 1}); save it as UTF-8"
+        ) from error
+    except OSError as error:
+        raise MotionStyleError(f"{path}: cannot read the sheet: {error.strerror}") from error
+    found = []
+    for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        try:
+            found.append((number, next(csv.reader([line], delimiter="\t", strict=True))))
+        except csv.Error as error:
+            raise MotionStyleError(f"{path.name} row {number}: unbalanced quotes") from error
+    return found
+
+
+def check_header(path: Path, number: int, header: list[str], columns: Sequence[str]) -> None:
+    """Refuse a header with unknown, doubled or missing columns."""
+    unknown = [name for name in header if name not in columns]
+    missing = [name for name in columns if name not in header]
+    where = f"{path.name} row {number}"
+    problems = [
+        f"{where}: unknown column {name!r}{near_matches(name, missing)}" for name in unknown
+    ]
+    problems += [f"{where}: column {name!r} is missing" for name in missing]
+    doubled = {name for name in header if header.count(name) > 1}
+    problems += [f"{where}: column {name!r} stands there twice" for name in sorted(doubled)]
+    if len(header) == 1:
+        problems = [
+            f"{where}: no tab in this line; columns are divided by tabs: {', '.join(columns)}"
+        ]
+    if problems:
+        raise MotionStyleError("\n".join(problems))

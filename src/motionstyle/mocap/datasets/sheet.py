@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from motionstyle.errors import MotionStyleError, near_matches
-from motionstyle.mocap.datasets.cells import Cells, finite
+from motionstyle.mocap.datasets.cells import Cells, check_header, finite, sheet_lines
 from motionstyle.mocap.datasets.doors import DatasetFile, unknown_dataset_file
 
 Datasets = Mapping[tuple[str, str], DatasetFile]
@@ -132,10 +130,10 @@ def read_sheet(
         With every problem of the sheet, one a line.
     """
     path = Path(path)
-    lines = _lines(path)
+    lines = sheet_lines(path)
     if not lines:
         raise MotionStyleError(f"{path}: the sheet is empty; its first line names the columns")
-    _check_header(path, *lines[0])
+    check_header(path, *lines[0], COLUMNS)
     if len(lines) == 1:
         raise MotionStyleError(f"{path}: the sheet has no rows under its column names")
     header = lines[0][1]
@@ -161,45 +159,6 @@ def read_sheet(
     if problems:
         raise MotionStyleError("\n".join(problems))
     return tuple(rows)
-
-
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Return (line number, cells) of every line that is neither empty nor a comment."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MotionStyleError(
-            f"{path}: the sheet is not UTF-8 text (byte {error.start + 1}); save it as UTF-8"
-        ) from error
-    except OSError as error:
-        raise MotionStyleError(f"{path}: cannot read the sheet: {error.strerror}") from error
-    found = []
-    for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        try:
-            found.append((number, next(csv.reader([line], delimiter="\t", strict=True))))
-        except csv.Error as error:
-            raise MotionStyleError(f"{path.name} row {number}: unbalanced quotes") from error
-    return found
-
-
-def _check_header(path: Path, number: int, header: list[str]) -> None:
-    unknown = [name for name in header if name not in COLUMNS]
-    missing = [name for name in COLUMNS if name not in header]
-    where = f"{path.name} row {number}"
-    problems = [
-        f"{where}: unknown column {name!r}{near_matches(name, missing)}" for name in unknown
-    ]
-    problems += [f"{where}: column {name!r} is missing" for name in missing]
-    doubled = {name for name in header if header.count(name) > 1}
-    problems += [f"{where}: column {name!r} stands there twice" for name in sorted(doubled)]
-    if len(header) == 1:
-        problems = [
-            f"{where}: no tab in this line; columns are divided by tabs: {', '.join(COLUMNS)}"
-        ]
-    if problems:
-        raise MotionStyleError("\n".join(problems))
 
 
 def _row(cells: Cells, folder: Path) -> ClipRow:

@@ -1,0 +1,226 @@
+"""Newton's step of the barrier problem: λ eliminated per frame, the rest solved as one band.
+
+Three moves: `newton_blocks` gathers what does not depend on the regularisation δ, `factorise`
+eliminates λ and finds the least δ that makes the matrix convex, `newton_step` solves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motionstyle.spacetime.banded import assemble_gradient, assemble_hessian, solve, spread
+from motionstyle.spacetime.barrier_problem import BarrierProblem
+from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
+from motionstyle.spacetime.spacetime_problem import COUNT, POINTS, Slopes, Values
+
+Array = NDArray[np.float64]
+METRIC = np.repeat([1.0, 1e-2, 1e-4], COUNT)  # of q, q̇, q̈ where curvature must be added
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Per-frame parts of the Newton system: exact curvature and Gauss–Newton parts apart.
+
+    Attributes
+    ----------
+    curved, gauss : over u, (F, 105, 105). mixed_curved, mixed_gauss : u × λ, (F, 105, 32).
+    inner_gauss : over λ, (F, 32, 32), and inner_diagonal (F, 32) of the barrier and w_λ.
+    force_pull : ∂φ/∂λ without residuals, (F, 32). by_force : ∂r/∂λ, (F, 35, 32), per 100 N.
+    stiff : stiffness of the inequality rows, (F, R).
+    """
+
+    barrier: float
+    curved: Array
+    gauss: Array
+    mixed_curved: Array
+    mixed_gauss: Array
+    inner_gauss: Array
+    inner_diagonal: Array
+    force_pull: Array
+    by_force: Array
+    slopes: Slopes
+    stiff: Array
+
+
+@dataclass(frozen=True)
+class Factor:
+    """The factored banded matrix, and per frame how λ is eliminated.
+
+    Attributes
+    ----------
+    inverse : of the λ block, (F, 32, 32). cross : u × λ block, (F, 105, 32).
+    answer : inverse · crossᵀ, (F, 32, 105). delta : the δ that was needed.
+    """
+
+    factor: Array
+    inverse: Array
+    cross: Array
+    answer: Array
+    delta: float
+
+
+def newton_blocks(
+    system: BarrierProblem, point: Point, values: Values, slopes: Slopes, barrier: float
+) -> Blocks:
+    """Return the parts of the Newton system that do not depend on the regularisation."""
+    evaluator = system.evaluator
+    n = len(evaluator.limited)
+    q, at = slice(0, COUNT), evaluator.limited
+    by_state = slopes.by_state
+    by_force = FORCE_UNIT * slopes.by_coefficients
+    pushes = -point.row_dual[:, 2 * n :] * evaluator.row_scale[2 * n :]
+    bend, mixed = evaluator.curvature(
+        values, slopes, point.multiplier, point.foot_multiplier, pushes
+    )
+    turned = np.swapaxes(by_state, 1, 2)
+    gauss = turned @ by_state
+    gauss[:, q, q] += np.swapaxes(slopes.feet, 1, 2) @ slopes.feet
+    # Inequalities have the stiffness w/(s + w/ρ).
+    firm = point.slack + point.row_dual / system.weight
+    stiff = np.where(system.active, point.row_dual / firm, 0.0)
+    stiff_scaled = stiff * evaluator.row_scale**2
+    up = slopes.heights * stiff_scaled[:, 2 * n :, None]
+    bend[:, q, q] += np.swapaxes(slopes.heights, 1, 2) @ up
+    bend[:, at, at] += stiff_scaled[:, :n] + stiff_scaled[:, n : 2 * n]
+    safe = np.where(system.bearing, point.coefficients, 1.0)
+    pull = np.where(system.bearing, system.force_weight * point.coefficients - barrier / safe, 0.0)
+    return Blocks(
+        barrier=barrier,
+        curved=bend,
+        gauss=gauss,
+        mixed_curved=FORCE_UNIT * mixed,
+        mixed_gauss=turned @ by_force,
+        inner_gauss=np.swapaxes(by_force, 1, 2) @ by_force,
+        inner_diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
+        force_pull=pull,
+        by_force=by_force,
+        slopes=slopes,
+        stiff=stiff,
+    )
+
+
+def factorise(system: BarrierProblem, blocks: Blocks, last: float) -> Factor:
+    """Return the factored Newton matrix, regularised by as little δ as makes it convex.
+
+    Parameters
+    ----------
+    last : the last δ that was not 0, or 0.
+
+    Raises
+    ------
+    FloatingPointError
+        If no δ makes it so, which is when its entries are not finite.
+    """
+    delta = 0.0
+    while True:
+        found = _eliminate(system, blocks, delta)
+        if found is not None:
+            return found
+        if delta == 0:
+            delta = 1e-4 if last == 0 else max(1e-20, last / 3)
+        else:
+            delta *= 100.0 if last == 0 else 8.0
+        if not delta < 1e20:
+            raise FloatingPointError("the Newton matrix has entries that are not finite")
+
+
+def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor | None:
+    """Return the factored matrix with λ eliminated; None if it is not convex at δ.
+
+    δ is added on all unknowns: on the copies of residuals it means (1 + δ) JᵀJ, a metric in
+    which the valleys of E are not narrow.
+    """
+    more = 1 + delta
+    index = np.arange(4 * POINTS)
+    hessian = blocks.curved + more * blocks.gauss
+    if delta:
+        diagonal = np.arange(3 * COUNT)
+        hessian[:, diagonal, diagonal] += delta * METRIC
+    inner = more * blocks.inner_gauss
+    inner[:, index, index] += blocks.inner_diagonal + delta
+    cross = blocks.mixed_curved + more * blocks.mixed_gauss
+    inverse = np.linalg.inv(inner)
+    answer = inverse @ np.swapaxes(cross, 1, 2)
+    hessian -= cross @ answer
+    fixed = np.where(system.fixed, 1e12, 0.0).ravel()
+    factor = assemble_hessian(system.evaluator.basis, hessian).factor(fixed + delta)
+    return None if factor is None else Factor(factor, inverse, cross, answer, delta)
+
+
+def newton_step(
+    system: BarrierProblem, point: Point, blocks: Blocks, factor: Factor, excess: Excess
+) -> tuple[Point, float]:
+    """Return the step for given constraint errors, and the slope of φ along it."""
+    basis, more = system.evaluator.basis, 1 + factor.delta
+    lift = point.lift + more * excess.residuals
+    foot_lift = point.foot_lift + more * excess.feet
+    firm = point.slack + point.row_dual / system.weight
+    target = blocks.barrier + point.row_dual * (
+        point.slack - (excess.rows + point.slack - point.elastic)
+    )
+    wanted = np.where(system.active, target / firm, 0.0)
+    gradient = np.einsum("fru,fr->fu", blocks.slopes.by_state, lift)
+    gradient[:, :COUNT] += np.einsum("fru,fr->fu", blocks.slopes.feet, foot_lift)
+    gradient[:, :COUNT] -= system.row_pull(blocks.slopes, wanted)
+    pull = np.einsum("fru,fr->fu", blocks.by_force, lift) + blocks.force_pull
+    answer = (factor.inverse @ pull[..., None])[..., 0]
+    gradient -= (factor.cross @ answer[..., None])[..., 0]
+    right = -assemble_gradient(basis, gradient)
+    right[system.fixed] = 0.0
+    moved = solve(factor.factor, right)
+    moved[system.fixed] = 0.0
+    state = spread(basis, moved)
+    forces = -answer - (factor.answer @ state[..., None])[..., 0]
+    forces = np.where(system.bearing, forces, 0.0)
+    return _whole_step(system, point, blocks, excess, wanted, moved, state, forces, factor.delta)
+
+
+def _whole_step(
+    system: BarrierProblem,
+    point: Point,
+    blocks: Blocks,
+    excess: Excess,
+    wanted: Array,
+    moved: Array,
+    state: Array,
+    forces: Array,
+    delta: float,
+) -> tuple[Point, float]:
+    """Return the whole step and the slope of φ along it, from its part in (x, λ)."""
+    evaluator, barrier, slopes = system.evaluator, blocks.barrier, blocks.slopes
+    n, at, q = len(evaluator.limited), evaluator.limited, slice(0, COUNT)
+    change = np.einsum("fru,fu->fr", slopes.by_state, state)
+    change += np.einsum("fru,fu->fr", blocks.by_force, forces)
+    lift = change + excess.residuals
+    foot_lift = np.einsum("fru,fu->fr", slopes.feet, state[:, q]) + excess.feet
+    rows = np.empty_like(point.slack)
+    rows[:, :n] = state[:, at]
+    rows[:, n : 2 * n] = -state[:, at]
+    rows[:, 2 * n :] = np.einsum("fpq,fq->fp", slopes.heights, state[:, q])
+    rows *= evaluator.row_scale
+    new_dual = np.where(system.active, wanted - blocks.stiff * rows, 0.0)
+    elastic = np.where(system.active, new_dual / system.weight - point.elastic, 0.0)
+    slack = np.where(system.active, excess.rows + rows + elastic, 0.0)
+    safe = np.where(system.bearing, point.coefficients, 1.0)
+    dual = np.where(system.bearing, barrier / safe - point.dual * (1 + forces / safe), 0.0)
+    step = Point(
+        controls=moved,
+        coefficients=forces,
+        lift=lift,
+        foot_lift=foot_lift,
+        multiplier=(1 + delta) * lift + point.lift - point.multiplier,
+        foot_multiplier=(1 + delta) * foot_lift + point.foot_lift - point.foot_multiplier,
+        elastic=elastic,
+        slack=slack,
+        dual=dual,
+        row_dual=new_dual - point.row_dual,
+    )
+    slope = (point.lift * lift).sum() + (point.foot_lift * foot_lift).sum()
+    slope += (system.force_weight * point.coefficients * forces)[system.bearing].sum()
+    slope += (system.weight * point.elastic * elastic)[system.active].sum()
+    slope -= barrier * (forces / safe)[system.bearing].sum()
+    slope -= barrier * (slack / point.slack)[system.active].sum()
+    return step, float(slope)

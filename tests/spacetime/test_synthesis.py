@@ -1,0 +1,71 @@
+"""From a plan to a motion: what the solver is given, and what is reported of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motionstyle.body.kinematics import centre_of_mass
+from motionstyle.dynamics.codegen import load_functions
+from motionstyle.dynamics.functions import dynamics_functions
+from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.errors import MotionStyleError
+from motionstyle.motion.resample import resample
+from motionstyle.spacetime.edits import Edits
+from motionstyle.spacetime.solver_point import SolverSettings
+from motionstyle.spacetime.synthesis import USUAL_SHOES, initial_style_of, synthesise
+from motionstyle.spacetime.synthesis_plan import make_plan, planned_footprints
+from motionstyle.spacetime.synthesis_sheet import FootprintSource, SynthesisRow
+from synthetic_walk import make_walk
+
+
+def row_of(**edits):
+    return SynthesisRow(
+        "made", None, "same_footprints", "walk", "initial", "neutral", FootprintSource(),
+        Edits(**edits), None, None, (), None, 2, None,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def functions():
+    return load_functions(dynamics_functions, None) | load_functions(second_order_functions, None)
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """A made-up walk, half a second of it, whose contacts carry its weight."""
+    motion = resample(make_walk(), 30.0).window(20, 36)
+    held = motion.contacts.sum(axis=1)
+    forces = np.zeros((motion.frames, 8, 3))
+    weight = motion.body.mass * 9.81
+    forces[..., 1] = motion.contacts * (weight / np.maximum(held, 1))[:, None]
+    return replace(motion, contact_forces=forces)
+
+
+def test_the_initial_style_is_that_of_the_specification(walk, functions):
+    style = initial_style_of(walk, functions)
+    assert style.preferences == pytest.approx(np.full(29, 1 / 29))
+    assert style.passive.rest_angle == pytest.approx(walk.coordinates[:, 6:].mean(axis=0), abs=0.02)
+    assert (style.shoe_stiffness, style.shoe_rest_length) == USUAL_SHOES
+    assert style.about["recipe"] == "initial"
+    with pytest.raises(MotionStyleError, match="no contact forces; a style needs a physical one"):
+        initial_style_of(replace(walk, contact_forces=None), functions)
+
+
+def test_a_few_iterations_give_a_motion_with_forces_and_an_honest_status(walk, functions):
+    row = row_of()
+    plan = make_plan(row, walk, *planned_footprints(row, walk))
+    style = initial_style_of(walk, functions)
+    settings = SolverSettings(iterations=5)
+    found = synthesise(row, plan, style, functions, settings=settings, log=lambda _text: None)
+    assert found.report["status"] != "converged"
+    assert found.motion.provenance["solver_status"] == found.report["status"]
+    assert found.motion.kind == "nio"
+    assert found.motion.contact_forces is not None
+    assert found.report["cone_excess_n"] == pytest.approx(0.0, abs=1e-6)
+    assert found.report["iterations"] == len(found.trace) >= 6
+    assert np.isfinite([step["energy"] for step in found.trace]).all()
+    height = centre_of_mass(found.motion.body, found.motion.pose())[:, 1]
+    assert height.min() > 0.5

@@ -1,0 +1,12 @@
+"""Draw how well each method tells similar pairs from others."""
+
+from pathlib import Path
+
+from motionstyle.figures.similarity import discrimination_figure
+from motionstyle.figures.style import save
+from motionstyle.jobs import job
+from motionstyle.tables import read_table
+
+with job(snakemake.log[0]):
+    figure = discrimination_figure(read_table(snakemake.input.table))
+    save(figure, Path(snakemake.output.svg).with_suffix(""))
