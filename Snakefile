@@ -9,6 +9,8 @@ configfile: workflow.source_path("config/config.yaml")
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/style_machines_common.smk"
+include: "workflow/rules/style_machines.smk"
 include: "workflow/rules/mocap.smk"
 include: "workflow/rules/physics.smk"
 include: "workflow/rules/moments.smk"

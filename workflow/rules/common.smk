@@ -25,6 +25,7 @@ PACKAGE = Path(motionstyle.__file__).parent
 PATH_KEYS = (
     *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
     *("planted", "normative", "syntheses", "similarity", "adaptations"),
+    "style_machines",
 )
 
 
@@ -229,6 +230,7 @@ def motion_files():
     captured += [MOTIONS / f"{kind}/{id}.npz" for id in SYNTHESES for kind in ("nio", "warp")]
     captured += [MOTIONS / f"warp/{id}_copied.npz" for id in SYNTHESES]
     captured += [MOTIONS / "planted" / f"{id}.npz" for id in PLANTED]
+    captured += [file for job in SHMM_MADE for file in shmm_motions(job)]
     return captured + [MOTIONS / "adapted" / f"{id}.npz" for id in ADAPTED]
 
 
@@ -266,6 +268,7 @@ FIGURES = ["body", "strips", "gait", "markers", "marker_fit"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates", "plate_moments"] if PLATES else []
 FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else []
+# The tables and figures of style machines are added in their rules.
 FIGURES += ["syntheses", "warps"] if SYNTHESES else []
 FIGURES += ["solvers"] if COMPARED else []
 FIGURES += ["similarity_features", "leg_subspaces", "leakage", "discrimination"] if SIMILAR else []

@@ -148,6 +148,7 @@ rule publish:
                 *("body", "clips", "gait_angles", "gait", "claims"),
                 *("physical", "force_plates", "joint_moments", "plate_moments", "root_residual"),
                 "benchmark_dynamics",
+                *SHMM_TABLES,
                 *(SIMILARITY_TABLES if SIMILAR else ()),
             )
         ],

@@ -1,0 +1,1 @@
+"""Style machines (Brand & Hertzmann 2000): stylistic hidden Markov models of motion."""
