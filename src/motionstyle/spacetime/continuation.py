@@ -26,6 +26,7 @@ GAINS = (20.0, 60.0, 200.0)
 STAGE_TOLERANCE = 1e-3  # of the stages before the last
 STAGE_ITERATIONS = 120
 WARM_BARRIER = 1e-4
+BARRIER_SHARE, LARGEST_BARRIER = 1e-5, 10.0  # of E at the start: poor starts need more barrier
 
 
 def solve_spacetime(
@@ -50,7 +51,7 @@ def solve_spacetime(
     own = problem.settings.sigmoid_gain
     gains = [] if warm else [gain for gain in GAINS if gain < own]
     trace, iterations, seconds = [], 0, 0.0
-    barrier = WARM_BARRIER if warm else settings.barrier
+    barrier = WARM_BARRIER if warm else _first_barrier(problem, controls, coefficients, settings)
     for gain in [*gains, own]:
         last = gain == own
         stage = replace(problem, settings=replace(problem.settings, sigmoid_gain=gain))
@@ -77,3 +78,17 @@ def solve_spacetime(
         controls, coefficients = result.point.controls, result.point.coefficients * FORCE_UNIT
         barrier = WARM_BARRIER
     return replace(result, iterations=iterations, seconds=seconds, trace=trace)
+
+
+def _first_barrier(
+    problem: SpacetimeProblem,
+    controls: Array,
+    coefficients: Array | None,
+    settings: SolverSettings,
+) -> float:
+    """Return μ to start with: little for a start of little energy."""
+    evaluator = Evaluator(problem)
+    start = InteriorPoint(evaluator, settings).start(controls, coefficients)
+    energy = evaluator.values(start.controls, start.coefficients * FORCE_UNIT).energy
+    wanted = BARRIER_SHARE * energy if np.isfinite(energy) else settings.barrier
+    return float(np.clip(wanted, settings.barrier, max(settings.barrier, LARGEST_BARRIER)))

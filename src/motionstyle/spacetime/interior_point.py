@@ -97,11 +97,14 @@ class InteriorPoint:
             step, slope = newton_step(system, point, blocks, factor, excess)
             accepted = self._search(point, step, slope, phi, theta, barrier, filter_, limits)
             if accepted is None:
+                accepted = self._restored(point, values, slopes, step, barrier)
+                filter_ = []
+            if accepted is None:
                 if theta <= 1e-9 * max(1.0, abs(phi)):
                     status = "no step found"
                     break
                 # Restoration is exact here: the copies take the residuals' own values.
-                point, filter_, length = self._closed(point, values), [], 0.0
+                point, length = self._closed(point, values), 0.0
                 continue
             length, values = accepted.length, accepted.values
             point = self._safe_duals(accepted.point, barrier)
@@ -148,15 +151,7 @@ class InteriorPoint:
         limits: tuple[float, float],
     ) -> _Trial | None:
         """Return the first trial point along the step that the filter accepts, or None."""
-        fraction = max(0.99, 1 - barrier)
-        primal = self._longest(
-            [(point.coefficients, step.coefficients, self.system.bearing),
-             (point.slack, step.slack, self.system.active)], fraction
-        )  # fmt: skip
-        dual = self._longest(
-            [(point.dual, step.dual, self.system.bearing),
-             (point.row_dual, step.row_dual, self.system.active)], fraction
-        )  # fmt: skip
+        primal, dual = self._lengths(point, step, barrier)
         noise = 10 * np.finfo(float).eps * abs(phi)
         length = primal
         for _ in range(25):
@@ -178,6 +173,34 @@ class InteriorPoint:
                     return _Trial(moved, values, length)
             length *= 0.5
         return None
+
+    def _restored(
+        self, point: Point, values: Values, slopes: Slopes, step: Point, barrier: float
+    ) -> _Trial | None:
+        """Return the whole step if it lowers the barrier problem's error, or None.
+
+        The soft restoration of Wächter & Biegler §3.3: near an optimum φ and θ change by less
+        than rounding, but the error of the optimality conditions still tells steps apart.
+        """
+        primal, dual = self._lengths(point, step, barrier)
+        moved = point.moved(step, primal, dual)
+        found = self._values(moved)
+        before = self.system.error(point, values, slopes, barrier)
+        after = self.system.error(moved, found, self.evaluator.slopes(found), barrier)
+        return _Trial(moved, found, primal) if after <= 0.9 * before else None
+
+    def _lengths(self, point: Point, step: Point, barrier: float) -> tuple[float, float]:
+        """Return how far a step may go in primal and in dual unknowns."""
+        fraction = max(0.99, 1 - barrier)
+        primal = self._longest(
+            [(point.coefficients, step.coefficients, self.system.bearing),
+             (point.slack, step.slack, self.system.active)], fraction
+        )  # fmt: skip
+        dual = self._longest(
+            [(point.dual, step.dual, self.system.bearing),
+             (point.row_dual, step.row_dual, self.system.active)], fraction
+        )  # fmt: skip
+        return primal, dual
 
     def _closed(self, point: Point, values: Values) -> Point:
         """Return the point with copies, slacks and elastic parts that miss no constraint."""
