@@ -16,7 +16,7 @@ SCHEMA = ROOT / "workflow" / "schemas" / "config.schema.json"
 NAMES = (
     *("motions.tsv", "datasets.tsv", "embedded.yaml", "claims.yaml"),
     *("planted.yaml", "normative_gait.yaml", "syntheses.tsv"),
-    *("similarity.yaml", "adaptations.tsv"),
+    *("similarity.yaml", "adaptations.tsv", "style_machines.yaml"),
 )
 
 
@@ -69,7 +69,7 @@ def test_shipped_configurations_agree_with_the_schema(root):
     default = yaml.safe_load((ROOT / "config" / "config.yaml").read_text(encoding="utf-8"))
     full = yaml.safe_load((ROOT / "config" / "full.yaml").read_text(encoding="utf-8"))
     for raw in (default, {**default, **full}):
-        for key in ("motions", "syntheses"):
+        for key in ("motions", "syntheses", "style_machines"):
             (root / raw[key]).write_text("")
             (ROOT / raw[key]).resolve(strict=True)
         config = load_config(raw, SCHEMA, root)
