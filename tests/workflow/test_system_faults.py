@@ -42,14 +42,15 @@ def two(project):
 
 def test_fault_14_a_full_disk_leaves_no_half_file_and_the_next_run_recovers(two):
     """The system refuses bytes beyond a limit, as it does on a full disk."""
-    full = two.run("out/motions/captured/steady.npz", limits="ulimit -f 12")
+    two.add("long.bvh", bvh_text(frames=480))  # its motion is larger than Snakemake's own files
+    full = two.run("out/motions/captured/long.npz", limits="ulimit -f 64")
     assert full.code != 0
     assert "error: [Errno 27] File too large" in full.output
     assert "Traceback" not in full.output
     assert two.files("motions/**/*") == {}
     assert not two.leftovers()
-    assert two.run("out/motions/captured/steady.npz").code == 0
-    assert load_motion(two.results / "motions/captured/steady.npz").frames == 48
+    assert two.run("out/motions/captured/long.npz").code == 0
+    assert load_motion(two.results / "motions/captured/long.npz").frames == 480
 
 
 def test_fault_17_results_that_cannot_be_written_are_one_line(two):
