@@ -43,7 +43,7 @@ def _panel(
     for cycles, colour, style in ((own, OWN, "-"), (plate, PLATE, (0, (4, 1.5)))):
         if len(cycles):
             axes.plot(PERCENT, np.median(cycles, axis=0), color=colour, linestyle=style, lw=1.6)
-    low, high = np.percentile(own, [1, 99])
+    low, high = np.percentile(np.concatenate([own, plate]) if len(plate) else own, [1, 99])
     edges = [edge for band in bands.values() for edge in (band.low, band.high)]
     axes.set_ylim(min([low, *edges]) - 0.2, max([high, *edges]) + 0.2)
     axes.axhline(0, color="black", linewidth=0.4)

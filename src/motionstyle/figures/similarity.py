@@ -197,7 +197,7 @@ def leakage_figure(rows: Table, held_out: Mapping[str, Array]) -> Figure:
         Line2D([], [], color=SERIES[2], marker="v", linestyle="", label="width chosen blindly"),
     ]
     note = "" if data == "captured" else " (planted motions: drawn, not claimed)"
-    figure.suptitle(f"Relative leakage in 20 folds{note}", x=0.01, ha="left")
+    figure.suptitle(f"Relative leakage of held-out patterns{note}", x=0.01, ha="left")
     figure.legend(handles=handles, loc="outside lower center", ncols=5)
     return figure
 

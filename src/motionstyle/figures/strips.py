@@ -55,7 +55,9 @@ def plan_strip(motion: Motion, across: Array, width: float, count: int | None) -
     as many as can be told apart, 2 to 16.
     """
     forward = across - across[0]
-    in_time = float(np.ptp(forward)) < HARDLY_TRAVELS_M
+    travelled = float(np.ptp(forward))
+    crowded = count is not None and travelled < (count - 1) * SPACING_M / 2
+    in_time = crowded or travelled < HARDLY_TRAVELS_M
     beyond = np.flatnonzero(np.abs(forward) > LONGEST_M)
     last = int(beyond[0]) - 1 if len(beyond) and not in_time else motion.frames - 1
     if count is None:

@@ -397,7 +397,7 @@ def analogies_figure(table: pd.DataFrame) -> Figure:
         )
         takes = rows["take"].nunique()
         axes.set_title(f"{name}: {rows['pair'].nunique()} pairs, {takes} take(s)", loc="left")
-        axes.set_ylim(bottom=0)
+    panels[0].set_ylim(bottom=0)  # shared: once all panels hold their points
     panels[0].set_ylabel(
         "pose distance to the true run, deg\n(median over takes; line: median of pairs)"
     )
