@@ -152,7 +152,7 @@ rule publish:
                 *(SIMILARITY_TABLES if SIMILAR else ()),
             )
         ],
-        figures=[RESULTS / f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png")],
+        figures=[RESULTS / f"figures/{name}.png" for name in FIGURES],
         stamp=RESULTS / "status/clips.ok",
         datasets=CONFIG["datasets"],
     log:
