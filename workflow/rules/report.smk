@@ -147,7 +147,13 @@ rule publish:
             for name in (
                 *("body", "clips", "gait_angles", "gait", "claims"),
                 *("physical", "force_plates", "joint_moments", "plate_moments", "root_residual"),
-                *("benchmark_dynamics", "syntheses", "ramp_gait", "solver_comparison"),
+                *(
+                    "benchmark_dynamics",
+                    "shmm_benchmark",
+                    "syntheses",
+                    "ramp_gait",
+                    "solver_comparison",
+                ),
                 *SHMM_TABLES,
                 *(SIMILARITY_TABLES if SIMILAR else ()),
             )
