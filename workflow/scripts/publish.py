@@ -1,12 +1,12 @@
 """Copy the figures and tables of a full run to results/published, with what made them."""
 
-import shutil
 from pathlib import Path
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import atomic_write, file_sha256, write_json
 from motionstyle.jobs import job
 from motionstyle.mocap.datasets.doors import read_datasets
+from motionstyle.report.pictures import small_png
 
 with job(snakemake.log[0]):
     params = snakemake.params
@@ -20,8 +20,9 @@ with job(snakemake.log[0]):
     for group in ("tables", "figures"):
         for file in map(Path, getattr(snakemake.input, group)):
             copy = folder / group / file.name
-            with atomic_write(copy, "wb") as handle, file.open("rb") as source:
-                shutil.copyfileobj(source, handle)
+            content = small_png(file) if file.suffix == ".png" else file.read_bytes()
+            with atomic_write(copy, "wb") as handle:
+                handle.write(content)
             made[f"{group}/{file.name}"] = file_sha256(copy)
     datasets = read_datasets(snakemake.input.datasets)
     write_json(
