@@ -17,7 +17,7 @@ rule footprints:
     resources:
         mem_mb=1000,
     params:
-        library=library("body", "motion", "spacetime", "figures"),
+        library=library("body", "motion", "spacetime", "figures/footprints.py", "figures/style.py"),
         sheet=CONFIG["syntheses"],
         row=lambda wildcards: synthesis_text(wildcards.synthesis),
     script:
