@@ -33,9 +33,12 @@ class BandedHessian:
         return None if info else factor
 
 
-def solve(factor: Array, right: Array) -> Array:
-    """Return A⁻¹ b from the Cholesky factor of A, in the shape of b."""
-    found, info = dpbtrs(factor, right.ravel(), lower=1)
+def solve(factor: Array, right: Array, columns: bool = False) -> Array:
+    """Return A⁻¹ b from the Cholesky factor of A, in the shape of b.
+
+    columns : b is (N, k), one right-hand side a column; else its numbers are one side in order.
+    """
+    found, info = dpbtrs(factor, right if columns else right.ravel(), lower=1)
     if info:
         raise LinAlgError(f"banded solve failed with flag {info}")
     return found.reshape(right.shape)
@@ -74,6 +77,15 @@ def assemble_gradient(basis: SplineBasis, gradients: Array) -> Array:
     for c in range(4):
         np.add.at(total, basis.first + c, local[:, c])
     return total
+
+
+def gather(basis: SplineBasis, columns: Array) -> Array:
+    """Return Σ_t Φ_tᵀ G_t (K·n, k) of G (F, 3n, k)."""
+    frames, wide, k = columns.shape
+    n = wide // 3
+    return assemble_gradient(basis, columns.reshape(frames, 3, n * k).reshape(frames, -1)).reshape(
+        -1, k
+    )
 
 
 def spread(basis: SplineBasis, controls: Array) -> Array:

@@ -19,6 +19,8 @@ from motionstyle.spacetime.spacetime_problem import COUNT, POINTS, Slopes, Value
 Array = NDArray[np.float64]
 METRIC = np.repeat([1.0, 1e-2, 1e-4], COUNT)  # of q, q̇, q̈ where curvature must be added
 
+RIGID = 1e20  # what holds fixed control points: far above the largest curvature, some 1e11
+
 
 @dataclass(frozen=True)
 class Blocks:
@@ -147,7 +149,7 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     inverse = np.linalg.inv(inner)
     answer = inverse @ np.swapaxes(cross, 1, 2)
     hessian -= cross @ answer
-    fixed = np.where(system.fixed, 1e12, 0.0).ravel()
+    fixed = np.where(system.fixed, RIGID, 0.0).ravel()
     factor = assemble_hessian(system.evaluator.basis, hessian).factor(fixed + delta)
     return None if factor is None else Factor(factor, inverse, cross, answer, delta)
 
