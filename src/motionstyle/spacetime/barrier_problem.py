@@ -17,7 +17,7 @@ class BarrierProblem:
 
     Attributes
     ----------
-    bearing : coefficients λ that may push, (F, 32). active : inequality rows that count, (F, R).
+    bearing : coefficients λ that may push, (F, 32), and bearing_at their indices by frame. active : inequality rows that count, (F, R).
     weight : ρ of each row's elastic part, (R,). force_weight : w_λ per (λ/100 N)².
     fixed : control points that must not move, (K, 35).
     """
@@ -25,6 +25,7 @@ class BarrierProblem:
     def __init__(self, evaluator: Evaluator) -> None:
         self.evaluator = evaluator
         self.bearing = evaluator.bearing
+        self.bearing_at = [np.flatnonzero(row) for row in self.bearing]
         self.active = evaluator.row_active
         self.weight = evaluator.row_weight
         self.force_weight = evaluator.problem.settings.force_weight * FORCE_UNIT**2

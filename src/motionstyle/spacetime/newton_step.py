@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from motionstyle.spacetime.banded import assemble_gradient, assemble_hessian, solve, spread
 from motionstyle.spacetime.barrier_problem import BarrierProblem
+from motionstyle.spacetime.elimination import Eliminated, eliminate
 from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
 from motionstyle.spacetime.spacetime_problem import COUNT, POINTS, Slopes, Values
 
@@ -49,18 +50,10 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Factor:
-    """The factored banded matrix, and per frame how λ is eliminated.
-
-    Attributes
-    ----------
-    inverse : of the λ block, (F, 32, 32). cross : u × λ block, (F, 105, 32).
-    answer : inverse · crossᵀ, (F, 32, 105). delta : the δ that was needed.
-    """
+    """The factored banded matrix, how λ was eliminated from it, and the δ that was needed."""
 
     factor: Array
-    inverse: Array
-    cross: Array
-    answer: Array
+    eliminated: Eliminated
     delta: float
 
 
@@ -146,12 +139,10 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     inner[:, index, index] += blocks.inner_diagonal + delta
     cross = more * blocks.mixed_gauss
     cross += blocks.mixed_curved
-    inverse = np.linalg.inv(inner)
-    answer = inverse @ np.swapaxes(cross, 1, 2)
-    hessian -= cross @ answer
+    eliminated = eliminate(hessian, inner, cross, system.bearing_at)
     fixed = np.where(system.fixed, RIGID, 0.0).ravel()
     factor = assemble_hessian(system.evaluator.basis, hessian).factor(fixed + delta)
-    return None if factor is None else Factor(factor, inverse, cross, answer, delta)
+    return None if factor is None else Factor(factor, eliminated, delta)
 
 
 def newton_step(
@@ -170,14 +161,15 @@ def newton_step(
     gradient[:, :COUNT] += np.einsum("fru,fr->fu", blocks.slopes.feet, foot_lift)
     gradient[:, :COUNT] -= system.row_pull(blocks.slopes, wanted)
     pull = np.einsum("fru,fr->fu", blocks.by_force, lift) + blocks.force_pull
-    answer = (factor.inverse @ pull[..., None])[..., 0]
-    gradient -= (factor.cross @ answer[..., None])[..., 0]
+    eliminated = factor.eliminated
+    answer = eliminated.forward(pull[..., None])
+    gradient -= (eliminated.half.swapaxes(1, 2) @ answer)[..., 0]
     right = -assemble_gradient(basis, gradient)
     right[system.fixed] = 0.0
     moved = solve(factor.factor, right)
     moved[system.fixed] = 0.0
     state = spread(basis, moved)
-    forces = -answer - (factor.answer @ state[..., None])[..., 0]
+    forces = -eliminated.backward(answer + eliminated.half @ state[..., None])[..., 0]
     forces = np.where(system.bearing, forces, 0.0)
     return _whole_step(system, point, blocks, excess, wanted, moved, state, forces, factor.delta)
 

@@ -69,15 +69,16 @@ class OptimumHessian:
         bearing = self.system.bearing[..., None]
         # The solver minimises half of E, with λ in units of 100 N.
         pull = np.where(bearing, 0.5 * FORCE_UNIT * by_coefficients, 0.0)
-        answer = factor.inverse @ pull
-        right = -gather(basis, 0.5 * by_state - factor.cross @ answer)
+        eliminated = factor.eliminated
+        answer = eliminated.forward(pull)
+        right = -gather(basis, 0.5 * by_state - eliminated.half.swapaxes(1, 2) @ answer)
         fixed = self.system.fixed.ravel()
         right[fixed] = 0.0
         moved = solve(factor.factor, right, columns=True)
         moved[fixed] = 0.0
         # Coordinates and parameters count as one another's columns: (K, 35·k) is spread as (K, n).
         state = spread(basis, moved.reshape(basis.controls, -1)).reshape(by_state.shape)
-        forces = np.where(bearing, -answer - factor.answer @ state, 0.0)
+        forces = np.where(bearing, -eliminated.backward(answer + eliminated.half @ state), 0.0)
         return Sensitivity(moved, FORCE_UNIT * forces, factor.delta)
 
 
