@@ -41,6 +41,10 @@ class BarrierProblem:
         half = (point.lift**2).sum() + (point.foot_lift**2).sum()
         half += self.force_weight * (point.coefficients[self.bearing] ** 2).sum()
         half += (self.weight * point.elastic**2)[self.active].sum()
+        tracking = self.evaluator.problem.tracking
+        if tracking is not None:
+            away = self.evaluator.basis.evaluate(point.controls)[0] - tracking.coordinates
+            half += (tracking.weights * away**2).sum()
         return float(0.5 * half - barrier * logs)
 
     def excess(self, point: Point, values: Values) -> Excess:
@@ -67,6 +71,7 @@ class BarrierProblem:
     def error(self, point: Point, values: Values, slopes: Slopes, barrier: float) -> float:
         """Return the scaled optimality error, Wächter & Biegler eq. (5)."""
         gradient = self.pull(slopes, point.multiplier, point.foot_multiplier, point.row_dual)
+        gradient[:, :COUNT] += self.evaluator.tracking_pull(values.coordinates)
         by_controls = assemble_gradient(self.evaluator.basis, gradient)
         by_controls[self.fixed] = 0.0
         by_force = FORCE_UNIT * np.einsum("fru,fr->fu", slopes.by_coefficients, point.multiplier)

@@ -20,6 +20,7 @@ from motionstyle.dynamics.inverse import foot_points, inverse_forces
 from motionstyle.dynamics.symbols import BodyParameters
 from motionstyle.spacetime.interior_point import InteriorPoint
 from motionstyle.spacetime.solver_point import FORCE_UNIT, SolverSettings
+from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.spacetime_problem import COUNT, HEELS, POINTS, Evaluator
 
 Array = NDArray[np.float64]
@@ -48,6 +49,8 @@ class IpoptReferee:
     def __init__(self, evaluator: Evaluator, **options: object) -> None:
         self.evaluator = evaluator
         problem = evaluator.problem
+        if problem.tracking is not None:
+            raise MotionStyleError("the referee knows no tracking term")
         frames, controls = problem.frames, evaluator.basis.controls
         self.frames, self.n_c = frames, controls * COUNT
         g, jacobian, hessian, sizes = self._frame_functions()

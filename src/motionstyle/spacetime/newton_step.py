@@ -31,6 +31,7 @@ class Blocks:
     ----------
     curved, gauss : over u, (F, 105, 105). mixed_curved, mixed_gauss : u × λ, (F, 105, 32).
     inner_gauss : over λ, (F, 32, 32), and inner_diagonal (F, 32) of the barrier and w_λ.
+    track_pull : ∂φ/∂q of the tracking term, (F, 35).
     force_pull : ∂φ/∂λ without residuals, (F, 32). by_force : ∂r/∂λ, (F, 35, 32), per 100 N.
     stiff : stiffness of the inequality rows, (F, R).
     """
@@ -42,6 +43,7 @@ class Blocks:
     mixed_gauss: Array
     inner_gauss: Array
     inner_diagonal: Array
+    track_pull: Array
     force_pull: Array
     by_force: Array
     slopes: Slopes
@@ -80,6 +82,10 @@ def newton_blocks(
     up = slopes.heights * stiff_scaled[:, 2 * n :, None]
     bend[:, q, q] += np.swapaxes(slopes.heights, 1, 2) @ up
     bend[:, at, at] += stiff_scaled[:, :n] + stiff_scaled[:, n : 2 * n]
+    tracking = evaluator.problem.tracking
+    if tracking is not None:
+        joints = np.arange(COUNT)
+        bend[:, joints, joints] += tracking.weights
     safe = np.where(system.bearing, point.coefficients, 1.0)
     pull = np.where(system.bearing, system.force_weight * point.coefficients - barrier / safe, 0.0)
     return Blocks(
@@ -90,6 +96,7 @@ def newton_blocks(
         mixed_gauss=turned @ by_force,
         inner_gauss=np.swapaxes(by_force, 1, 2) @ by_force,
         inner_diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
+        track_pull=evaluator.tracking_pull(values.coordinates),
         force_pull=pull,
         by_force=by_force,
         slopes=slopes,
@@ -159,7 +166,7 @@ def newton_step(
     wanted = np.where(system.active, target / firm, 0.0)
     gradient = np.einsum("fru,fr->fu", blocks.slopes.by_state, lift)
     gradient[:, :COUNT] += np.einsum("fru,fr->fu", blocks.slopes.feet, foot_lift)
-    gradient[:, :COUNT] -= system.row_pull(blocks.slopes, wanted)
+    gradient[:, :COUNT] += blocks.track_pull - system.row_pull(blocks.slopes, wanted)
     pull = np.einsum("fru,fr->fu", blocks.by_force, lift) + blocks.force_pull
     eliminated = factor.eliminated
     answer = eliminated.forward(pull[..., None])
@@ -215,6 +222,7 @@ def _whole_step(
         row_dual=new_dual - point.row_dual,
     )
     slope = (point.lift * lift).sum() + (point.foot_lift * foot_lift).sum()
+    slope += (blocks.track_pull * state[:, q]).sum()
     slope += (system.force_weight * point.coefficients * forces)[system.bearing].sum()
     slope += (system.weight * point.elastic * elastic)[system.active].sum()
     slope -= barrier * (forces / safe)[system.bearing].sum()

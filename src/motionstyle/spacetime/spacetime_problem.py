@@ -6,7 +6,8 @@ eq. (8). What is minimised, and what is the same for E(X_T) and E(X_S):
     E = Σ α_j Q_mj² + w_r Σ Q_0k²                      eq. (13), the energy that is reported
     + w_f Σ ‖C_p − target‖² over held points            footsteps; 1e7/m² holds them to 0.5 mm
     + w_λ Σ λ²                                          settles λ where eq. (8) leaves it open
-    + ½ρ Σ (excess over joint ranges, depth below the clearance)², kept small by a barrier.
+    + ½ρ Σ (excess over joint ranges, depth below the clearance)², kept small by a barrier
+    + Σ w (q − q̂)², only where a problem has a `Tracking`: learning keeps near its motion at first.
 
 Ends are free, or the first and last poses of a motion are kept. Derivatives per frame are with
 respect to u = (q, q̇, q̈), 105 numbers.
@@ -48,10 +49,22 @@ class SpacetimeSettings:
 
 
 @dataclass(frozen=True)
+class Tracking:
+    """A pull towards a motion: Σ weights (q − coordinates)² beside E.
+
+    coordinates : (F, 35). weights : (35,), in units of E by m² (root's place) and rad².
+    """
+
+    coordinates: Array
+    weights: Array
+
+
+@dataclass(frozen=True)
 class SpacetimeProblem:
     """What is to be solved: body, feet, style, ranges, ends.
 
     ranges : (35, 2), rad. keep_ends : control points at both ends that stay as in the start.
+    tracking : a pull towards a motion, for learning; None in every synthesis.
     """
 
     body: Body
@@ -62,6 +75,7 @@ class SpacetimeProblem:
     functions: dict[str, FrameFunction]
     settings: SpacetimeSettings = field(default_factory=SpacetimeSettings)
     keep_ends: int = 0
+    tracking: Tracking | None = None
 
     def __post_init__(self) -> None:
         if self.feet.frames < 8:
@@ -167,7 +181,10 @@ class Evaluator:
 
     def values(self, controls: Array, coefficients: Array) -> Values:
         """Return the problem's values at control points (K, 35) and coefficients (F, 32)."""
-        q, qd, qdd = self.basis.evaluate(controls)
+        return self.at(*self.basis.evaluate(controls), coefficients)
+
+    def at(self, q: Array, qd: Array, qdd: Array, coefficients: Array) -> Values:
+        """Return the problem's values at coordinates and their rates, (F, 35) each."""
         points = self.problem.functions["foot_points"](q, self.parameters)[0]
         points = points.reshape(-1, POINTS, 3)
         forces = self.contact_forces(coefficients)
@@ -225,6 +242,13 @@ class Evaluator:
         by_height = -heel * (on + steep * squeeze)
         by_height2 = heel * (2 * steep + bend * squeeze)
         return size[..., None] * feet.normals, by_height, by_height2
+
+    def tracking_pull(self, coordinates: Array) -> Array:
+        """Return half the slope of the tracking term by q, (F, 35)."""
+        tracking = self.problem.tracking
+        if tracking is None:
+            return np.zeros_like(coordinates)
+        return tracking.weights * (coordinates - tracking.coordinates)
 
     def slopes(self, values: Values) -> Slopes:
         """Return the first derivatives at a point."""
