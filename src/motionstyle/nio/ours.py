@@ -168,15 +168,18 @@ class _Learner:
         ]
         return np.concatenate(rows), controls
 
-    def step(self, state: _State, jacobian: Array, damping: float) -> Array:
-        """Return the step of y that the linearised problem asks for, in its bounds."""
+    def step(self, state: _State, jacobian: Array, trust: float) -> Array:
+        """Return the step of y that the linearised problem asks for, in its bounds.
+
+        trust : share of the longest step, of each coordinate of y.
+        """
         normal = jacobian.T @ jacobian
         pull = jacobian.T @ state.residuals
-        normal[np.diag_indices(SIZE)] += damping * np.trace(normal) / SIZE
+        normal[np.diag_indices(SIZE)] += self.settings.damping * np.trace(normal) / SIZE
         root = cholesky(normal)
         wanted = solve_triangular(root, -pull, trans=1)
         low, high = self.space.room(state.place)
-        longest = self.settings.longest_step
+        longest = trust * self.settings.longest_step
         low = np.minimum(np.maximum(low, -longest), -1e-12)
         high = np.maximum(np.minimum(high, longest), 1e-12)
         found = lsq_linear(root, wanted, bounds=(low, high)).x
@@ -240,23 +243,23 @@ def _stage(
     record: Callable[[_State, Stage, bool], None],
 ) -> _State:
     """Return the best state of one stage."""
-    settings, damping = learner.settings, learner.settings.damping
+    trust = 1.0
     jacobian, controls = learner.linearised(state)
     refused = 0
     for _ in range(stage.steps):
-        step = learner.step(state, jacobian, damping)
+        step = learner.step(state, jacobian, trust)
         moved = state.inner.result.point.controls + (controls @ step).reshape(-1, COUNT)
         found = learner.state(state.place + step, stage, moved, state.inner)
         better = learner.usable(found) and found.objective < state.objective
         record(found, stage, better)
         if not better:
-            damping, refused = 8 * damping, refused + 1
+            trust, refused = 0.3 * trust, refused + 1
             if refused == 3:
                 break
             continue
         gained = 1 - found.objective / state.objective
-        damping, refused, state = damping / 3, 0, found
-        if gained < settings.least_gain:
+        trust, refused, state = min(1.0, 1.5 * trust), 0, found
+        if gained < learner.settings.least_gain:
             break
         jacobian, controls = learner.linearised(state)
     return state
