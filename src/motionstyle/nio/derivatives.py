@@ -1,6 +1,7 @@
-"""Derivatives of E by θ: Liu et al. 2005, eq. (21), nio.md §4.6; and the mixed ones by motion and θ.
+"""Derivatives of E by θ: Liu et al. 2005, eq. (21), nio.md §4.6; and mixed ones.
 
-By the envelope theorem dG/dθ = ∂E(X_T)/∂θ − ∂E(X_S)/∂θ at fixed motions, exact where X_S is optimal.
+By the envelope theorem dG/dθ = ∂E(X_T)/∂θ − ∂E(X_S)/∂θ at fixed motions, exact where X_S is
+optimal.
 The mixed derivatives ∂²E/∂X∂θ tell how the optimum itself moves (`spacetime.sensitivity`).
 Order of θ as in `Style.vector`: α, k_s1, k_s2, k_d, q̄ (29 each), k_shoe, h̄.
 """
@@ -46,9 +47,7 @@ def _springs(evaluator: Evaluator, values: Values) -> list[_Spring]:
     rates = values.rates[:, JOINT_COORDINATES]
     turn = np.tanh(gain * away)
     above, steep = 0.5 * (turn + 1), 0.5 * gain * (1 - turn**2)
-    _force, slope, bend = evaluator.passive(
-        values.coordinates, values.rates
-    )
+    _force, slope, bend = evaluator.passive(values.coordinates, values.rates)
     none, ones = np.zeros_like(away), np.ones_like(away)
     return [
         _Spring(above * away, above + steep * away, none),

@@ -76,7 +76,7 @@ def inner_solve(
 
 
 def effective_number(shares: Array) -> float:
-    """Return the exponential of the entropy of shares: 29 where all are even, 1 where one has all."""
+    """Return the exponential of the entropy of shares: 29 if all are even, 1 if one has all."""
     positive = shares[shares > 0] / shares[shares > 0].sum()
     return float(np.exp(-(positive * np.log(positive)).sum()))
 

@@ -1,7 +1,7 @@
 """The learning problem: one captured motion X_T, made feasible, and what min E is held against.
 
-X_T as it comes from the physics fit obeys its own contacts and ground to a few millimetres, not this
-problem's to the last newton, and a root residual of 2 N is already 2·10⁵ in E (feasibility study,
+X_T as it comes from the physics fit obeys its own contacts and ground to a few millimetres, not
+this problem's to the last newton, and a root residual of 2 N is already 2·10⁵ in E (feasibility study,
 pitfall 4). So X_T is projected first: of the motions that the constraints allow, the one that
 follows it most closely, ties broken towards small joint torques (no style enters). The projected
 motion is X_T from there on, the same in E(X_T) and as the start of E(X_S).
@@ -46,8 +46,8 @@ from motionstyle.spacetime.synthesis import USUAL_SHOES
 Array = NDArray[np.float64]
 
 RATE_HZ = 30.0  # of the paper
-PLACE_BY_ANGLE = 10.0  # weight of 1 m² of the root against 1 rad²: 1 cm counts as 1.8°
-CLOSENESS = 1e5  # of the projection: 1 rad² against (1 N·m)² of the mean joint torque
+PLACE_BY_ANGLE = 30.0  # weight of 1 m² of the root against 1 rad²: 1 cm counts as 3°
+CLOSENESS = 3e4  # of the projection: 1 rad² against (1 N·m)² of the mean joint torque
 TARGET_BARRIER = 1e-6
 ROOT_LIMIT_N = 1.0  # root residual that a projected motion may keep, N and N·m
 

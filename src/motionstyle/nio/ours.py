@@ -3,7 +3,7 @@
 The paper descends G alone, each step from an X_S that may lie anywhere. Here θ is moved so that X_S
 comes to X_T: an optimum's derivative by θ is known exactly (`spacetime.sensitivity`), so
 
-    min over θ:  rms²(X_S(θ) − X_T)  +  w_G G/E(X_T)  +  w_0 |y − y_0|²        (degrees², y scaled θ)
+    min over θ:  rms²(X_S(θ) − X_T)  +  w_G G/E(X_T)  +  w_0 |y − y_0|²     (degrees², y scaled θ)
 
 is a least-squares problem. At first X_S is also pulled towards X_T (closeness κ): close to X_T the
 optimum is unique, easily found and nearly linear in θ. κ falls to 0 in stages, each starting from
@@ -213,7 +213,7 @@ def learn(
         log(
             f"{len(rows) - 1:3d} κ {stage.closeness:g} gain {stage.gain:g}: objective "
             f"{found.objective:.3f}, {row['joint_error_deg']:.2f}°, G/E "
-            f"{row['G_over_E_target']:.3f}, E {row['E_target']:.0f}, {row['inner_iterations']} its, "
+            f"{row['G_over_E_target']:.3f}, E {row['E_target']:.0f}, {row['inner_iterations']} its "
             f"{row['status']}{'' if accepted else ', refused'}, {rows[-1]['seconds']:.0f} s"
         )
 

@@ -1,4 +1,4 @@
-"""θ in coordinates that suit an optimiser: logarithms of α, the rest by a usual size, with bounds."""
+"""θ in coordinates that suit an optimiser: log α, the rest by a usual size, with bounds."""
 
 from __future__ import annotations
 
