@@ -1,8 +1,8 @@
 """The learning problem: one captured motion X_T, made feasible, and what min E is held against.
 
 X_T as it comes from the physics fit obeys its own contacts and ground to a few millimetres, not
-this problem's to the last newton, and a root residual of 2 N is already 2·10⁵ in E (feasibility study,
-pitfall 4). So X_T is projected first: of the motions that the constraints allow, the one that
+this problem's to the last newton, and a root residual of 2 N is already 2·10⁵ in E (feasibility
+study, pitfall 4). So X_T is projected first: of the motions that the constraints allow, the one that
 follows it most closely, ties broken towards small joint torques (no style enters). The projected
 motion is X_T from there on, the same in E(X_T) and as the start of E(X_S).
 """
