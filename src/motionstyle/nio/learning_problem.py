@@ -2,9 +2,9 @@
 
 X_T as it comes from the physics fit obeys its own contacts and ground to a few millimetres, not
 this problem's to the last newton, and a root residual of 2 N is already 2·10⁵ in E (feasibility
-study, pitfall 4). So X_T is projected first: of the motions that the constraints allow, the one that
-follows it most closely, ties broken towards small joint torques (no style enters). The projected
-motion is X_T from there on, the same in E(X_T) and as the start of E(X_S).
+study, pitfall 4). So X_T is projected first: of the motions that the constraints allow, the one
+that follows it most closely, ties broken towards small joint torques (no style enters). The
+projected motion is X_T from there on, the same in E(X_T) and as the start of E(X_S).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from motionstyle.dynamics.passive import PassiveParameters
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import resample
+from motionstyle.spacetime.barrier_problem import BarrierProblem
 from motionstyle.spacetime.edits import Edits, edit_ranges
 from motionstyle.spacetime.foot_constraints import FootConstraints
 from motionstyle.spacetime.footprint_constraints import captured_constraints
@@ -257,16 +258,16 @@ def cost_of_point(problem: SpacetimeProblem, point: Point) -> Cost:
     return cost_at(problem, point.controls, point.coefficients * FORCE_UNIT)
 
 
-def target_cost(learning: LearningProblem, style: Style, gain: float | None = None) -> Cost:
-    """Return E(X_T; θ) with the contact forces that suit X_T best at θ.
+def motion_cost(problem: SpacetimeProblem, controls: Array) -> Cost:
+    """Return what is minimised at a motion, with the contact forces that suit it best.
 
-    λ of X_T is a nuisance: found anew at every θ, G ≥ 0 and the envelope gradient still hold.
+    λ of a given motion is a nuisance: found anew at every θ, G ≥ 0 and the envelope gradient hold.
     """
-    problem = learning.problem(style, gain=gain)
-    point = starting_point(
-        InteriorPoint(Evaluator(problem), SolverSettings()).system,
-        learning.controls,
-        None,
-        TARGET_BARRIER,
-    )
+    system = BarrierProblem(Evaluator(problem))
+    point = starting_point(system, controls, None, TARGET_BARRIER)
     return cost_of_point(problem, point)
+
+
+def target_cost(learning: LearningProblem, style: Style, gain: float | None = None) -> Cost:
+    """Return E(X_T; θ)."""
+    return motion_cost(learning.problem(style, gain=gain), learning.controls)

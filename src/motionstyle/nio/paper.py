@@ -20,7 +20,7 @@ from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.passive import LARGEST_DAMPING, LARGEST_STIFFNESS, SIGMOID_GAIN
 from motionstyle.nio.derivatives import JOINTS, SIZE, energy_by_style
 from motionstyle.nio.inner import Inner, InnerSettings, inner_solve, learning_row
-from motionstyle.nio.learning_problem import Cost, LearningProblem, cost_of_point, target_cost
+from motionstyle.nio.learning_problem import Cost, LearningProblem, motion_cost, target_cost
 from motionstyle.nio.ours import Learnt
 from motionstyle.nio.style_space import LARGEST_SHOE_LENGTH, LARGEST_SHOE_STIFFNESS
 from motionstyle.spacetime.style import Style
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 LEAST_PREFERENCE = 1e-5  # α below 0 makes E unbounded (nio.md §10)
 SUM_WEIGHT = 1e4  # w of eq. (18)
 REFERENCE = (1 / 29, 100.0, 100.0, 5.0, 0.5)  # of α, k_s1, k_s2, k_d, q̄ (nio.md A5)
-SHOE_REFERENCE = (2e4, 0.02)
+SHOE_REFERENCE = (1e3, 5e-4)  # 2e4, 0.02 would leave room for no other unknown's step
 SMALLEST_STEP = 1e-6
 
 
@@ -40,13 +40,15 @@ class PaperSettings:
 
     iterations : of the main loop, 50 in the paper. inner_iterations : after which an inner solve
     is cut off. scaled : whether unknowns are scaled by their usual size. trials : how many step
-    lengths may be verified by a true G before the step counts as the search's floor.
+    lengths, each a quarter of the last, are verified by a true G before learning stops. After the
+    first step none longer than `growth` times the last accepted one is tried.
     """
 
     iterations: int = 50
     inner_iterations: int = 40
     scaled: bool = True
-    trials: int = 3
+    trials: int = 10
+    growth: float = 16.0
     barrier: float = 1e-2
 
 
@@ -76,7 +78,7 @@ def learn_as_paper(
     style = learning.start
     rows: list[dict[str, Any]] = []
     inner, target = _solved(learning, style, settings)
-    solves = 1
+    solves, longest = 1, 1.0
 
     def record(iteration: int, step: float, accepted: bool) -> None:
         row = learning_row(learning, style, target, inner)
@@ -95,7 +97,7 @@ def learn_as_paper(
         slope = slope - energy_by_style(inner.problem, inner.cost.values)
         slope += soft_slopes(style.preferences)
         found = None
-        beta = _bracketed(learning, style, inner, unit**2 * slope, (low, high))
+        beta = min(longest, _bracketed(learning, style, inner, unit**2 * slope, (low, high)))
         for _ in range(settings.trials):
             moved = _moved(style, beta, unit**2 * slope, low, high)
             trial, trial_target = _solved(learning, moved, settings)
@@ -108,6 +110,7 @@ def learn_as_paper(
             log(f"{iteration:3d} no step lowers G + D: stopped")
             break
         style, inner, target = found
+        longest = settings.growth * beta
         record(iteration, beta, True)
     about = dict(learning.start.about) | {
         "recipe": "paper",
@@ -145,6 +148,9 @@ def _solved(learning: LearningProblem, style: Style, settings: PaperSettings) ->
         learning.controls,
     )
     target = target_cost(learning, style)
+    settled = motion_cost(inner.problem, inner.result.point.controls)
+    if settled.total < inner.cost.total:  # cut off early, λ lags behind the motion
+        inner = replace(inner, cost=settled)
     if not inner.cost.total <= target.total:
         inner = replace(inner, cost=target)
     return inner, target
@@ -171,7 +177,7 @@ def _bracketed(
         moved = _moved(style, beta, way, *bounds)
         problem = replace(inner.problem, style=moved)
         at_target = target_cost(learning, moved)
-        at_synth = cost_of_point(problem, inner.result.point)
+        at_synth = motion_cost(problem, inner.result.point.controls)
         return at_target.total - at_synth.total + soft_constraints(moved.preferences)
 
     beta = 1.0
