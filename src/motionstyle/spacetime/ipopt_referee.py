@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from motionstyle.dynamics.inverse import foot_points, inverse_forces
 from motionstyle.dynamics.symbols import BodyParameters
+from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.interior_point import InteriorPoint
 from motionstyle.spacetime.solver_point import FORCE_UNIT, SolverSettings
-from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.spacetime_problem import COUNT, HEELS, POINTS, Evaluator
 
 Array = NDArray[np.float64]
