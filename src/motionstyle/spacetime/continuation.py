@@ -32,7 +32,7 @@ class Stage:
     """A gentler problem on the way.
 
     gain : of the springs' sigmoid, 1/rad. root_share : of the root's own weight. barrier : μ to
-    begin with. tolerance, iterations : where it ends.
+    begin with. tolerance, iterations : where it ends. whole_steps : see `SolverSettings`.
     """
 
     gain: float
@@ -40,10 +40,11 @@ class Stage:
     barrier: float
     tolerance: float
     iterations: int
+    whole_steps: bool = False
 
 
 STAGES = (
-    Stage(20.0, 0.01, 1e-1, 0.2, 50),
+    Stage(20.0, 0.01, 1e-1, 0.2, 50, whole_steps=True),
     Stage(60.0, 0.1, 1e-2, 0.1, 30),
     Stage(200.0, 1.0, 1e-3, 0.1, 30),
 )
@@ -92,6 +93,7 @@ def solve_spacetime(
                 tolerance=max(settings.tolerance, stage.tolerance),
                 iterations=min(settings.iterations, stage.iterations),
                 barrier=stage.barrier,
+                whole_steps=stage.whole_steps,
                 seconds=max(0.0, settings.seconds - seconds),
             ),
         )

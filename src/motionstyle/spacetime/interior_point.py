@@ -49,11 +49,12 @@ STIFFEST = 1e8  # the δ at which a search is given up
 
 @dataclass(frozen=True)
 class _Trial:
-    """A point that was accepted, and the nonlinearity of the step that led to it."""
+    """A point that was accepted, and length and nonlinearity of the step that led to it."""
 
     point: Point
     values: Values
-    nonlinearity: float
+    length: float
+    nonlinearity: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,8 @@ class InteriorPoint:
         barrier, wanted, last = self.settings.barrier, FIRST_DELTA, 0.0
         trace: list[Trace] = []
         values = self._values(point)
-        point = system.settled(point, values, barrier)
+        if self.settings.whole_steps:
+            point = system.settled(point, values, barrier)
         theta = system.excess(point, values).total()
         limits = (1e4 * max(1.0, theta), 1e-4 * max(1.0, theta))
         filter_: list[tuple[float, float]] = []
@@ -120,7 +122,8 @@ class InteriorPoint:
             lower = self._lowered(barrier, point, values, slopes)
             if lower < barrier:
                 barrier, filter_ = lower, []
-                point = system.settled(point, values, barrier)
+                if self.settings.whole_steps:
+                    point = system.settled(point, values, barrier)
                 excess, phi = system.excess(point, values), system.objective(point, barrier)
             here = _Here(point, excess, phi, excess.total(), barrier, limits)
             blocks = newton_blocks(system, point, values, slopes, barrier)
@@ -136,7 +139,7 @@ class InteriorPoint:
                 # Restoration is exact here: the copies take the residuals' own values.
                 point, length, filter_ = self._closed(point, values, barrier), 0.0, []
                 continue
-            length, values, bent = 1.0, accepted.values, accepted.nonlinearity
+            length, values, bent = accepted.length, accepted.values, accepted.nonlinearity
             point = self._safe_duals(accepted.point, barrier)
             last, wanted = delta or last, self._next_delta(delta, bent)
         spent = perf_counter() - began
@@ -211,22 +214,28 @@ class InteriorPoint:
         filter_: list[tuple[float, float]],
     ) -> _Trial | None:
         """Return the step, or the step with corrections, if the filter accepts it, or None."""
-        settings, gain = self.settings, max(-slope + here.excess.energy(), 1e-300)
-        noise, before, total, this = 1e-9 * abs(here.phi), np.inf, here.excess, step
+        settings, total, this, before = self.settings, here.excess, step, np.inf
+        noise = 1e-9 * abs(here.phi)
         for corrections in range(settings.corrections + 1):
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
-                moved, values = self._moved(here, this)
+                moved, values, length = self._moved(here, this)
                 miss = self.system.excess(moved, values)
-                missed = miss.energy()
+                missed = miss.plus(here.excess, length - 1).energy()
             if not np.isfinite(missed):
                 return None
+            gain = max(-slope * length + here.excess.energy(), 1e-300)
             more = corrections < settings.corrections
             bent = missed > max(settings.loose * gain, noise) and missed < 0.5 * before
             tame = missed <= max(MOST_NONLINEAR * gain, noise)
-            if tame and not (more and bent) and self._accepts(here, moved, miss, slope, filter_):
-                return _Trial(moved, values, missed / gain)
+            if (
+                tame
+                and not (more and bent)
+                and self._accepts(here, moved, miss, slope * length, filter_)
+            ):
+                return _Trial(moved, values, length, missed / gain)
             if more:
-                before, total = missed, total.plus(miss)
+                total = miss.plus(here.excess, length) if corrections == 0 else total.plus(miss)
+                before = missed
                 this, _slope = newton_step(self.system, here.point, blocks, factor, total)
         return None
 
@@ -261,26 +270,31 @@ class InteriorPoint:
         than rounding, but the error of the optimality conditions still tells steps apart.
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
-            moved, found = self._moved(here, step)
+            moved, found, length = self._moved(here, step)
         if not np.isfinite(found.energy):
             return None
         before = self.system.error(here.point, values, slopes, here.barrier)
         after = self.system.error(moved, found, self.evaluator.slopes(found), here.barrier)
-        return _Trial(moved, found, 0.0) if after <= 0.9 * before else None
+        return _Trial(moved, found, length) if after <= 0.9 * before else None
 
-    def _moved(self, here: _Here, step: Point) -> tuple[Point, Values]:
-        """Return the point a whole step away and its values; no λ goes all the way to 0."""
+    def _moved(self, here: _Here, step: Point) -> tuple[Point, Values, float]:
+        """Return the point a step away, its values, and the step's length."""
         point, system = here.point, self.system
-        kept = min(0.01, here.barrier)
+        kept, whole = min(0.01, here.barrier), self.settings.whole_steps
+        primal = 1.0 if whole else self._longest(
+            [(point.coefficients, step.coefficients, system.bearing),
+             (point.slack, step.slack, system.active)], 1 - kept
+        )  # fmt: skip
         dual = self._longest(
             [(point.dual, step.dual, system.bearing),
              (point.row_dual, step.row_dual, system.active)], 1 - kept
         )  # fmt: skip
-        moved = point.moved(step, 1.0, dual)
-        forces = np.maximum(moved.coefficients, kept * point.coefficients)
-        moved = replace(moved, coefficients=np.where(system.bearing, forces, 0.0))
+        moved = point.moved(step, primal, dual)
+        if whole:
+            forces = np.maximum(moved.coefficients, kept * point.coefficients)
+            moved = replace(moved, coefficients=np.where(system.bearing, forces, 0.0))
         values = self._values(moved)
-        return system.settled(moved, values, here.barrier), values
+        return system.settled(moved, values, here.barrier) if whole else moved, values, primal
 
     def _closed(self, point: Point, values: Values, barrier: float) -> Point:
         """Return the point with copies, slacks and elastic parts that miss no constraint."""

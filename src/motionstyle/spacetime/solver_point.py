@@ -24,6 +24,9 @@ class SolverSettings:
         since what it cuts depends on the machine.
     barrier : first μ. It is lowered to min(barrier_shrink·μ, μ^barrier_power) whenever the error
         of the barrier problem is below barrier_gate·μ.
+    whole_steps : let λ that would turn negative stop short one by one and settle slacks in closed
+        form, which gets along from poor starts; else the whole step stops short, which keeps
+        primal and dual unknowns in step and converges faster.
     corrections : second-order ones a step may have. loose, wild : nonlinearity of a step above
         which it is corrected, and δ is raised.
     """
@@ -35,6 +38,7 @@ class SolverSettings:
     barrier_shrink: float = 0.2
     barrier_power: float = 1.5
     barrier_gate: float = 10.0
+    whole_steps: bool = False
     corrections: int = 3
     loose: float = 0.1
     wild: float = 1.0
@@ -83,10 +87,12 @@ class Excess:
     feet: Array
     rows: Array
 
-    def plus(self, other: Excess) -> Excess:
-        """Return the sum of two errors."""
+    def plus(self, other: Excess, times: float = 1.0) -> Excess:
+        """Return the sum of two errors, the other a number of times."""
         return Excess(
-            self.residuals + other.residuals, self.feet + other.feet, self.rows + other.rows
+            self.residuals + times * other.residuals,
+            self.feet + times * other.feet,
+            self.rows + times * other.rows,
         )
 
     def energy(self) -> float:
