@@ -35,7 +35,8 @@ def result(problem, start, told):
 
 def test_the_last_stage_is_the_problem_itself(result, problem, told):
     stages = [line for line in told if line.startswith("sigmoid gain")]
-    assert stages == [f"sigmoid gain {gain}/rad" for gain in (20, 60, 200, 500)]
+    ways = ((20, 1), (60, 10), (200, 100), (500, 100))
+    assert stages == [f"sigmoid gain {g}/rad, root weight {w}" for g, w in ways]
     assert result.status == "converged"
     evaluator = Evaluator(problem)
     own = evaluator.values(result.point.controls, result.point.coefficients * FORCE_UNIT)
@@ -63,10 +64,23 @@ def test_a_warm_start_goes_straight_to_the_own_gain(result, problem):
         problem, result.point.controls, result.point.coefficients * FORCE_UNIT,
         warm=True, log=told.append,
     )  # fmt: skip
-    assert [line for line in told if line.startswith("sigmoid")] == ["sigmoid gain 500/rad"]
+    assert [line for line in told if line.startswith("sigmoid")] == [
+        "sigmoid gain 500/rad, root weight 100"
+    ]
     assert again.status == "converged"
     assert again.values.energy == pytest.approx(result.values.energy, rel=1e-5)
     assert again.iterations < result.iterations
+
+
+def test_a_whole_point_starts_closer_still(result, problem):
+    told = []
+    again = solve_spacetime(
+        problem, result.point.controls, start_point=result.point, log=told.append
+    )
+    assert len([line for line in told if line.startswith("sigmoid")]) == 1
+    assert again.status == "converged"
+    assert again.iterations <= 3
+    assert again.values.energy == pytest.approx(result.values.energy, rel=1e-6)
 
 
 def test_limits_hold_for_all_stages_together(problem, start):

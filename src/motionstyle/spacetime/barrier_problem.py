@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,8 @@ class BarrierProblem:
 
     Attributes
     ----------
-    bearing : coefficients λ that may push, (F, 32), and bearing_at their indices by frame. active : inequality rows that count, (F, R).
+    bearing : coefficients λ that may push, (F, 32), and bearing_at : their indices by frame.
+    active : inequality rows that count, (F, R).
     weight : ρ of each row's elastic part, (R,). force_weight : w_λ per (λ/100 N)².
     fixed : control points that must not move, (K, 35).
     """
@@ -46,6 +49,21 @@ class BarrierProblem:
             away = self.evaluator.basis.evaluate(point.controls)[0] - tracking.coordinates
             half += (tracking.weights * away**2).sum()
         return float(0.5 * half - barrier * logs)
+
+    def settled(self, point: Point, values: Values, barrier: float) -> Point:
+        """Return the point with slacks and elastic parts that are best for its inequalities.
+
+        The least ½ρp² − μ log s under g + p = s has a closed form, so that rows never limit a step.
+        """
+        rows, weight = values.inequalities, self.weight
+        root = np.sqrt(rows**2 + 4 * barrier / weight)
+        slack = np.where(
+            rows > 0, (rows + root) / 2, 2 * barrier / weight / (root - np.minimum(rows, 0.0))
+        )
+        slack = np.where(self.active, slack, 1.0)
+        return replace(
+            point, slack=slack, elastic=np.where(self.active, barrier / weight / slack, 0.0)
+        )
 
     def excess(self, point: Point, values: Values) -> Excess:
         """Return by how much each constraint is missed at a point."""

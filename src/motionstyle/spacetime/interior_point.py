@@ -20,9 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.spacetime.barrier_problem import BarrierProblem
-from motionstyle.spacetime.newton_step import factorise, newton_blocks, newton_step
+from motionstyle.spacetime.newton_step import (
+    Blocks,
+    Factor,
+    factorise,
+    newton_blocks,
+    newton_step,
+)
 from motionstyle.spacetime.solver_point import (
     FORCE_UNIT,
+    Excess,
     InteriorPointResult,
     Point,
     SolverSettings,
@@ -34,13 +41,32 @@ from motionstyle.spacetime.starting_point import starting_point
 Array = NDArray[np.float64]
 
 
+MOST_NONLINEAR = 10.0  # a step that errs by more than ten times its gain is not taken
+LEAST_DELTA, FIRST_DELTA = 1e-4, 1e-2  # below the first δ counts as 0
+UP, DOWN = 4.0, 3.0  # of δ after a step that was not taken, and between good steps
+STIFFEST = 1e8  # the δ at which a search is given up
+
+
 @dataclass(frozen=True)
 class _Trial:
-    """A point that was accepted, and the step length that led to it."""
+    """A point that was accepted, and length and nonlinearity of the step that led to it."""
 
     point: Point
     values: Values
     length: float
+    nonlinearity: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Here:
+    """Where a step starts from: the point, its errors, objective and their limits."""
+
+    point: Point
+    excess: Excess
+    phi: float
+    theta: float
+    barrier: float
+    limits: tuple[float, float]
 
 
 class InteriorPoint:
@@ -51,9 +77,14 @@ class InteriorPoint:
         self.settings = settings
         self.system = BarrierProblem(evaluator)
 
-    def start(self, controls: Array, coefficients: Array | None = None) -> Point:
-        """Return a point to start from; λ (N) is found from the motion if it is not given."""
-        return starting_point(self.system, controls, coefficients, self.settings.barrier)
+    def start(
+        self, controls: Array, coefficients: Array | None = None, *, near: bool = False
+    ) -> Point:
+        """Return a point to start from; λ (N) is found from the motion if it is not given.
+
+        near : whether it is close to an optimum, so that its residuals serve as multipliers.
+        """
+        return starting_point(self.system, controls, coefficients, self.settings.barrier, near=near)
 
     def solve(self, point: Point, log: Callable[[str], None] | None = None) -> InteriorPointResult:
         """Return the optimum reached from a point, or the last point and why it is none.
@@ -63,21 +94,26 @@ class InteriorPoint:
         log : told one line per iteration.
         """
         system, began = self.system, perf_counter()
-        barrier, last = self.settings.barrier, 0.0
+        barrier, wanted, last = self.settings.barrier, FIRST_DELTA, 0.0
         trace: list[Trace] = []
         values = self._values(point)
+        if self.settings.whole_steps:
+            point = system.settled(point, values, barrier)
         theta = system.excess(point, values).total()
         limits = (1e4 * max(1.0, theta), 1e-4 * max(1.0, theta))
         filter_: list[tuple[float, float]] = []
-        length = delta = 0.0
+        length = delta = bent = 0.0
         while True:
             slopes = self.evaluator.slopes(values)
             error = system.error(point, values, slopes, 0.0)
             excess, phi = system.excess(point, values), system.objective(point, barrier)
-            theta, spent = excess.total(), perf_counter() - began
+            spent = perf_counter() - began
             trace.append(
-                Trace(len(trace), spent, values.energy, phi, theta, error, barrier, length, delta)
-            )
+                Trace(
+                    len(trace), spent, values.energy, phi, excess.total(), error, barrier, length,
+                    delta, bent,
+                )
+            )  # fmt: skip
             if log:
                 log(str(trace[-1]))
             status = self._verdict(trace[-1])
@@ -85,31 +121,60 @@ class InteriorPoint:
                 break
             lower = self._lowered(barrier, point, values, slopes)
             if lower < barrier:
-                barrier, filter_, phi = lower, [], system.objective(point, lower)
+                barrier, filter_ = lower, []
+                if self.settings.whole_steps:
+                    point = system.settled(point, values, barrier)
+                excess, phi = system.excess(point, values), system.objective(point, barrier)
+            here = _Here(point, excess, phi, excess.total(), barrier, limits)
             blocks = newton_blocks(system, point, values, slopes, barrier)
             try:
-                factor = factorise(system, blocks, last)
+                accepted, delta = self._stepped(here, blocks, wanted, last, values, filter_)
             except FloatingPointError:
                 status = "not a number"
                 break
-            delta = factor.delta
-            last = delta or last
-            step, slope = newton_step(system, point, blocks, factor, excess)
-            accepted = self._search(point, step, slope, phi, theta, barrier, filter_, limits)
             if accepted is None:
-                accepted = self._restored(point, values, slopes, step, barrier)
-                filter_ = []
-            if accepted is None:
-                if theta <= 1e-9 * max(1.0, abs(phi)):
+                if here.theta <= 1e-9 * max(1.0, abs(phi)):
                     status = "no step found"
                     break
                 # Restoration is exact here: the copies take the residuals' own values.
-                point, length = self._closed(point, values), 0.0
+                point, length, filter_ = self._closed(point, values, barrier), 0.0, []
                 continue
-            length, values = accepted.length, accepted.values
+            length, values, bent = accepted.length, accepted.values, accepted.nonlinearity
             point = self._safe_duals(accepted.point, barrier)
+            last, wanted = delta or last, self._next_delta(delta, bent)
         spent = perf_counter() - began
         return InteriorPointResult(status, point, values, error, len(trace) - 1, spent, trace)
+
+    def _stepped(
+        self,
+        here: _Here,
+        blocks: Blocks,
+        wanted: float,
+        last: float,
+        values: Values,
+        filter_: list[tuple[float, float]],
+    ) -> tuple[_Trial | None, float]:
+        """Return the step that is taken, or None, and its δ, raised until a step is accepted."""
+        first = True
+        while True:
+            factor = factorise(self.system, blocks, wanted, last)
+            step, slope = newton_step(self.system, here.point, blocks, factor, here.excess)
+            found = self._search(here, blocks, factor, step, slope, filter_)
+            if found is None and first:
+                found = self._restored(here, values, blocks.slopes, step)
+                if found is not None:
+                    filter_.clear()
+            if found is not None or factor.delta > STIFFEST:
+                return found, factor.delta
+            first, wanted = False, max(UP * factor.delta, 1e-3)
+
+    def _next_delta(self, delta: float, nonlinearity: float) -> float:
+        """Return the δ to begin the next step with."""
+        if nonlinearity > self.settings.wild:
+            return max(3 * delta, 1e-3)
+        if nonlinearity < self.settings.loose:
+            delta /= DOWN
+        return delta if delta >= LEAST_DELTA else 0.0
 
     def _values(self, point: Point) -> Values:
         return self.evaluator.values(point.controls, point.coefficients * FORCE_UNIT)
@@ -141,80 +206,106 @@ class InteriorPoint:
 
     def _search(
         self,
-        point: Point,
+        here: _Here,
+        blocks: Blocks,
+        factor: Factor,
         step: Point,
         slope: float,
-        phi: float,
-        theta: float,
-        barrier: float,
         filter_: list[tuple[float, float]],
-        limits: tuple[float, float],
     ) -> _Trial | None:
-        """Return the first trial point along the step that the filter accepts, or None."""
-        primal, dual = self._lengths(point, step, barrier)
-        noise = 10 * np.finfo(float).eps * abs(phi)
-        length = primal
-        for _ in range(25):
-            moved = point.moved(step, length, dual)
-            values = self._values(moved)
-            new_theta = self.system.excess(moved, values).total()
-            new_phi = self.system.objective(moved, barrier)
-            blocked = not np.isfinite(new_phi + new_theta) or new_theta > limits[0]
-            blocked = blocked or any(
-                new_theta >= (1 - 1e-5) * t and new_phi >= p - 1e-5 * t for t, p in filter_
-            )
-            if not blocked:
-                steep = slope < 0 and length * (-slope) ** 2.3 > theta**1.1
-                if steep and theta <= limits[1]:
-                    if new_phi - phi - noise <= 1e-8 * length * slope:
-                        return _Trial(moved, values, length)
-                elif new_theta <= (1 - 1e-5) * theta or new_phi - noise <= phi - 1e-5 * theta:
-                    filter_.append(((1 - 1e-5) * theta, phi - 1e-5 * theta))
-                    return _Trial(moved, values, length)
-            length *= 0.5
+        """Return the step, or the step with corrections, if the filter accepts it, or None."""
+        settings, total, this, before = self.settings, here.excess, step, np.inf
+        noise = 1e-9 * abs(here.phi)
+        for corrections in range(settings.corrections + 1):
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
+                moved, values, length = self._moved(here, this)
+                miss = self.system.excess(moved, values)
+                missed = miss.plus(here.excess, length - 1).energy()
+            if not np.isfinite(missed):
+                return None
+            gain = max(-slope * length + here.excess.energy(), 1e-300)
+            more = corrections < settings.corrections
+            bent = missed > max(settings.loose * gain, noise) and missed < 0.5 * before
+            tame = missed <= max(MOST_NONLINEAR * gain, noise)
+            if (
+                tame
+                and not (more and bent)
+                and self._accepts(here, moved, miss, slope * length, filter_)
+            ):
+                return _Trial(moved, values, length, missed / gain)
+            if more:
+                total = miss.plus(here.excess, length) if corrections == 0 else total.plus(miss)
+                before = missed
+                this, _slope = newton_step(self.system, here.point, blocks, factor, total)
         return None
 
-    def _restored(
-        self, point: Point, values: Values, slopes: Slopes, step: Point, barrier: float
-    ) -> _Trial | None:
+    def _accepts(
+        self,
+        here: _Here,
+        moved: Point,
+        miss: Excess,
+        slope: float,
+        filter_: list[tuple[float, float]],
+    ) -> bool:
+        """Say whether a trial point is better in φ or in θ, and remember it in the filter."""
+        theta, phi = here.theta, here.phi
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            new_theta, new_phi = miss.total(), self.system.objective(moved, here.barrier)
+        rounding = 10 * np.finfo(float).eps * abs(phi)
+        if not np.isfinite(new_phi + new_theta) or new_theta > here.limits[0]:
+            return False
+        if any(new_theta >= (1 - 1e-5) * t and new_phi >= p - 1e-5 * t for t, p in filter_):
+            return False
+        if slope < 0 and (-slope) ** 2.3 > theta**1.1 and theta <= here.limits[1]:
+            return new_phi - phi - rounding <= 1e-8 * slope
+        if new_theta <= (1 - 1e-5) * theta or new_phi - rounding <= phi - 1e-5 * theta:
+            filter_.append(((1 - 1e-5) * theta, phi - 1e-5 * theta))
+            return True
+        return False
+
+    def _restored(self, here: _Here, values: Values, slopes: Slopes, step: Point) -> _Trial | None:
         """Return the whole step if it lowers the barrier problem's error, or None.
 
         The soft restoration of Wächter & Biegler §3.3: near an optimum φ and θ change by less
         than rounding, but the error of the optimality conditions still tells steps apart.
         """
-        primal, dual = self._lengths(point, step, barrier)
-        moved = point.moved(step, primal, dual)
-        found = self._values(moved)
-        before = self.system.error(point, values, slopes, barrier)
-        after = self.system.error(moved, found, self.evaluator.slopes(found), barrier)
-        return _Trial(moved, found, primal) if after <= 0.9 * before else None
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
+            moved, found, length = self._moved(here, step)
+        if not np.isfinite(found.energy):
+            return None
+        before = self.system.error(here.point, values, slopes, here.barrier)
+        after = self.system.error(moved, found, self.evaluator.slopes(found), here.barrier)
+        return _Trial(moved, found, length) if after <= 0.9 * before else None
 
-    def _lengths(self, point: Point, step: Point, barrier: float) -> tuple[float, float]:
-        """Return how far a step may go in primal and in dual unknowns."""
-        fraction = max(0.99, 1 - barrier)
-        primal = self._longest(
-            [(point.coefficients, step.coefficients, self.system.bearing),
-             (point.slack, step.slack, self.system.active)], fraction
+    def _moved(self, here: _Here, step: Point) -> tuple[Point, Values, float]:
+        """Return the point a step away, its values, and the step's length."""
+        point, system = here.point, self.system
+        kept, whole = min(0.01, here.barrier), self.settings.whole_steps
+        primal = 1.0 if whole else self._longest(
+            [(point.coefficients, step.coefficients, system.bearing),
+             (point.slack, step.slack, system.active)], 1 - kept
         )  # fmt: skip
         dual = self._longest(
-            [(point.dual, step.dual, self.system.bearing),
-             (point.row_dual, step.row_dual, self.system.active)], fraction
+            [(point.dual, step.dual, system.bearing),
+             (point.row_dual, step.row_dual, system.active)], 1 - kept
         )  # fmt: skip
-        return primal, dual
+        moved = point.moved(step, primal, dual)
+        if whole:
+            forces = np.maximum(moved.coefficients, kept * point.coefficients)
+            moved = replace(moved, coefficients=np.where(system.bearing, forces, 0.0))
+        values = self._values(moved)
+        return system.settled(moved, values, here.barrier) if whole else moved, values, primal
 
-    def _closed(self, point: Point, values: Values) -> Point:
+    def _closed(self, point: Point, values: Values, barrier: float) -> Point:
         """Return the point with copies, slacks and elastic parts that miss no constraint."""
-        slack = np.where(self.system.active, np.maximum(values.inequalities, 1e-8), 1.0)
-        elastic = np.where(self.system.active, slack - values.inequalities, 0.0)
-        return replace(
+        closed = replace(
             point,
             lift=values.residuals,
             foot_lift=values.foot_residuals,
             multiplier=values.residuals,
             foot_multiplier=values.foot_residuals,
-            slack=slack,
-            elastic=elastic,
         )
+        return self.system.settled(closed, values, barrier)
 
     def _safe_duals(self, point: Point, barrier: float) -> Point:
         """Keep duals within 1e10 of their central values, as Wächter & Biegler eq. (16)."""

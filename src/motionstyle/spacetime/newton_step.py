@@ -104,8 +104,8 @@ def newton_blocks(
     )
 
 
-def factorise(system: BarrierProblem, blocks: Blocks, last: float) -> Factor:
-    """Return the factored Newton matrix, regularised by as little δ as makes it convex.
+def factorise(system: BarrierProblem, blocks: Blocks, wanted: float, last: float = 0.0) -> Factor:
+    """Return the factored Newton matrix, with the δ that is wanted or as much as makes it convex.
 
     Parameters
     ----------
@@ -114,17 +114,14 @@ def factorise(system: BarrierProblem, blocks: Blocks, last: float) -> Factor:
     Raises
     ------
     FloatingPointError
-        If no δ makes it so, which is when its entries are not finite.
+        If no δ makes it convex, which is when its entries are not finite.
     """
-    delta = 0.0
+    delta = wanted
     while True:
         found = _eliminate(system, blocks, delta)
         if found is not None:
             return found
-        if delta == 0:
-            delta = 1e-4 if last == 0 else max(1e-20, last / 3)
-        else:
-            delta *= 100.0 if last == 0 else 8.0
+        delta = 4 * delta if delta else max(1e-4, last / 3)
         if not delta < 1e20:
             raise FloatingPointError("the Newton matrix has entries that are not finite")
 

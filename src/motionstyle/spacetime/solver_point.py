@@ -24,6 +24,11 @@ class SolverSettings:
         since what it cuts depends on the machine.
     barrier : first μ. It is lowered to min(barrier_shrink·μ, μ^barrier_power) whenever the error
         of the barrier problem is below barrier_gate·μ.
+    whole_steps : let λ that would turn negative stop short one by one and settle slacks in closed
+        form, which gets along from poor starts; else the whole step stops short, which keeps
+        primal and dual unknowns in step and converges faster.
+    corrections : second-order ones a step may have. loose, wild : nonlinearity of a step above
+        which it is corrected, and δ is raised.
     """
 
     tolerance: float = 1e-6
@@ -33,6 +38,10 @@ class SolverSettings:
     barrier_shrink: float = 0.2
     barrier_power: float = 1.5
     barrier_gate: float = 10.0
+    whole_steps: bool = False
+    corrections: int = 3
+    loose: float = 0.1
+    wild: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -78,6 +87,18 @@ class Excess:
     feet: Array
     rows: Array
 
+    def plus(self, other: Excess, times: float = 1.0) -> Excess:
+        """Return the sum of two errors, the other a number of times."""
+        return Excess(
+            self.residuals + times * other.residuals,
+            self.feet + times * other.feet,
+            self.rows + times * other.rows,
+        )
+
+    def energy(self) -> float:
+        """Return half the squares of the errors of residuals and feet."""
+        return 0.5 * float((self.residuals**2).sum() + (self.feet**2).sum())
+
     def total(self) -> float:
         """Return θ, the sum of all magnitudes."""
         parts = (self.residuals, self.feet, self.rows)
@@ -93,6 +114,7 @@ class Trace:
     seconds : since the start. energy : E of eq. (13). objective : φ. infeasibility : θ.
     optimality : scaled error at μ = 0. barrier : μ.
     step, regularisation : length α and δ of the step that led here, 0 at the start.
+    nonlinearity : ½‖errors‖² after the step by what it was to gain; δ follows it.
     """
 
     iteration: int
@@ -104,12 +126,13 @@ class Trace:
     barrier: float
     step: float
     regularisation: float
+    nonlinearity: float = 0.0
 
     def __str__(self) -> str:
         return (
             f"{self.iteration:4d} E {self.energy:12.5f} θ {self.infeasibility:9.2e} "
             f"opt {self.optimality:9.2e} μ {self.barrier:8.1e} α {self.step:7.1e} "
-            f"δ {self.regularisation:7.1e}"
+            f"δ {self.regularisation:7.1e} q {self.nonlinearity:7.1e}"
         )
 
 

@@ -13,9 +13,18 @@ Array = NDArray[np.float64]
 
 
 def starting_point(
-    system: BarrierProblem, controls: Array, coefficients: Array | None, barrier: float
+    system: BarrierProblem,
+    controls: Array,
+    coefficients: Array | None,
+    barrier: float,
+    *,
+    near: bool = False,
 ) -> Point:
     """Return a point whose motion is given; λ is made central, the copies equal the residuals.
+
+    Multipliers are 0 unless the motion is near an optimum: residuals that are large only because
+    the start is poor would bend the problem, and the first step be short. With 0 it is Gauss and
+    Newton's.
 
     Parameters
     ----------
@@ -29,13 +38,14 @@ def starting_point(
     values = evaluator.values(controls, scaled * FORCE_UNIT)
     slack = np.where(system.active, np.maximum(values.inequalities, 1e-2), 1.0)
     row_dual = np.where(system.active, np.minimum(barrier / slack, system.weight * slack), 0.0)
+    share = 1.0 if near else 0.0
     return Point(
         controls=controls,
         coefficients=scaled,
         lift=values.residuals,
         foot_lift=values.foot_residuals,
-        multiplier=values.residuals,
-        foot_multiplier=values.foot_residuals,
+        multiplier=share * values.residuals,
+        foot_multiplier=share * values.foot_residuals,
         elastic=row_dual / system.weight,
         slack=slack,
         dual=np.where(system.bearing, barrier / np.where(system.bearing, scaled, 1.0), 0.0),
