@@ -71,7 +71,7 @@ def inner_solve(
     forces = None if before is None else before.coefficients * FORCE_UNIT
     if controls is None:
         controls = learning.controls if before is None else before.controls
-    result = solver.solve(solver.start(controls, forces))
+    result = solver.solve(solver.start(controls, forces, near=True))
     return Inner(problem, result, cost_of_point(replace(problem, tracking=None), result.point))
 
 
