@@ -11,6 +11,14 @@ BY_CLIP = {row.clip: row for row in STYLES.values()}
 SHOWN_STYLES = [STYLES[id] for id in NIO["shown"] if id in STYLES] or list(STYLES.values())[:4]
 # Of one style, with which F2–F4 and E14 are shown.
 FIRST_STYLE = SHOWN_STYLES[0] if SHOWN_STYLES else None
+FIRST_JUDGED = [(row, kind) for row, kind in JUDGED if row is FIRST_STYLE]
+# Before and after learning are needed of it, whatever else is judged.
+if FIRST_STYLE:
+    FIRST_JUDGED += [
+        (FIRST_STYLE, kind)
+        for kind in ("initial", "ours")
+        if (FIRST_STYLE, kind) not in FIRST_JUDGED
+    ]
 LEARNT_KEYS = [(row.id, name) for row, name in LEARNT if name in ("ours", "paper")]
 
 if STYLES:
@@ -46,15 +54,17 @@ rule learn_style:
         LOGS / "nio/learning/{algorithm}/{clip}.log",
     benchmark:
         BENCHMARKS / "nio/learning/{algorithm}/{clip}.tsv"
-    conda:
-        "../envs/motionstyle.yaml"
     wildcard_constraints:
         algorithm="|".join(name for name in LEARNERS if name != "least_squares"),
+    conda:
+        "../envs/motionstyle.yaml"
     threads: 1
     resources:
         mem_mb=1500,
     params:
-        library=library("body", "motion", "dynamics", "spacetime", "nio", "evaluation/nio/learners.py"),
+        library=library(
+            "body", "motion", "dynamics", "spacetime", "nio", "evaluation/nio/learners.py"
+        ),
         sheet=NIO["styles"],
         row=lambda wildcards: style_text(wildcards.clip),
         settings_file=NIO["settings"],
@@ -179,3 +189,169 @@ rule style_parameters_table:
         config=CONFIG["name"],
     script:
         "../scripts/style_parameters_table.py"
+
+
+if STYLES:
+
+    rule nio_segment:
+        input:
+            motion=MOTIONS / f"captured/{FIRST_STYLE.clip}_physical.npz",
+            style=RESULTS / f"styles/ours/{FIRST_STYLE.clip}.json",
+            before=RESULTS / f"nio/motions/initial/{FIRST_STYLE.clip}.npz",
+            after=RESULTS / f"nio/motions/ours/{FIRST_STYLE.clip}.npz",
+            code=RESULTS / "dynamics/library.json",
+            second_order=RESULTS / "dynamics/second_order.json",
+        output:
+            found=RESULTS / "nio/segment.json",
+        log:
+            LOGS / "nio/segment.log",
+        benchmark:
+            BENCHMARKS / "nio/segment.tsv"
+        conda:
+            "../envs/motionstyle.yaml"
+        threads: 1
+        resources:
+            mem_mb=1500,
+        params:
+            library=library(
+                *("body", "motion", "dynamics", "spacetime", "nio"),
+                *("evaluation/nio/gradient_cost.py", "evaluation/spacetime/landscape.py"),
+            ),
+            sheet=NIO["styles"],
+            clip=FIRST_STYLE.clip,
+            row=style_text(FIRST_STYLE.clip),
+            solves=NIO["difference_solves"],
+        script:
+            "../scripts/nio_segment.py"
+
+    rule figure_checks_table:
+        input:
+            styles=[RESULTS / f"styles/{name}/{STYLES[id].clip}.json" for id, name in LEARNT_KEYS],
+            segment=RESULTS / "nio/segment.json",
+        output:
+            table=RESULTS / "tables/figure_checks.csv",
+        log:
+            LOGS / "figure_checks_table.log",
+        conda:
+            "../envs/motionstyle.yaml"
+        threads: 1
+        resources:
+            mem_mb=500,
+        params:
+            library=library(
+                *(
+                    "evaluation/nio/checks.py",
+                    "evaluation/nio/likelihood.py",
+                    "spacetime/style.py",
+                ),
+                *("dynamics/passive.py", "dynamics/shoes.py"),
+            ),
+            keys_of=LEARNT_KEYS,
+            config=CONFIG["name"],
+        script:
+            "../scripts/figure_checks_table.py"
+
+    rule figures_nio:
+        input:
+            styles=[RESULTS / f"styles/{name}/{STYLES[id].clip}.json" for id, name in LEARNT_KEYS],
+            initial=RESULTS / f"nio/initial/ours/{FIRST_STYLE.clip}.json",
+            segment=RESULTS / "nio/segment.json",
+            table=RESULTS / "tables/nio_learning.csv",
+        output:
+            **{
+                f"{name}_{kind}": RESULTS / f"figures/{name}.{kind}"
+                for name in (
+                    *("nio_springs", "nio_segment", "nio_learning", "nio_likelihood"),
+                    *("style_sides", "style_compared"),
+                )
+                for kind in ("svg", "png")
+            },
+        log:
+            LOGS / "figures/nio.log",
+        conda:
+            "../envs/motionstyle.yaml"
+        threads: 1
+        resources:
+            mem_mb=1000,
+        params:
+            library=library("evaluation/nio", "figures", "dynamics/passive.py", "dynamics/shoes.py"),
+            sheet=NIO["styles"],
+            keys_of=LEARNT_KEYS,
+            first=FIRST_STYLE.id,
+            shown=[row.id for row in SHOWN_STYLES],
+        script:
+            "../scripts/figures_nio.py"
+
+    rule figure_resynthesis:
+        input:
+            motions=[RESULTS / f"nio/motions/{kind}/{row.clip}.npz" for row, kind in FIRST_JUDGED],
+            rows=[RESULTS / f"nio/judged/{kind}/{row.clip}.json" for row, kind in FIRST_JUDGED],
+        output:
+            svg=RESULTS / "figures/resynthesis.svg",
+            png=RESULTS / "figures/resynthesis.png",
+        log:
+            LOGS / "figures/resynthesis.log",
+        conda:
+            "../envs/motionstyle.yaml"
+        threads: 1
+        resources:
+            mem_mb=1000,
+        params:
+            library=library("body", "motion", "figures"),
+            style=FIRST_STYLE.id,
+            kinds=[kind for _, kind in FIRST_JUDGED],
+        script:
+            "../scripts/figure_resynthesis.py"
+
+
+if TWIN_STYLES:
+
+    rule style_twin:
+        input:
+            motion=MOTIONS / f"captured/{STYLES[NIO['twins']['style']].clip}_physical.npz",
+            code=RESULTS / "dynamics/library.json",
+            second_order=RESULTS / "dynamics/second_order.json",
+            schema=ROOT / "workflow/schemas/nio.schema.json",
+        output:
+            rows=RESULTS / "known_truth/style_twins_{seed}_{noise}.json",
+        log:
+            LOGS / "known_truth/style_twins_{seed}_{noise}.log",
+        benchmark:
+            BENCHMARKS / "known_truth/style_twins_{seed}_{noise}.tsv"
+        wildcard_constraints:
+            noise="[0-9]+",
+        conda:
+            "../envs/motionstyle.yaml"
+        threads: 1
+        resources:
+            mem_mb=1500,
+        params:
+            library=library(
+                *("body", "motion", "dynamics", "spacetime", "nio", "evaluation/nio/twins.py"),
+            ),
+            sheet=NIO["styles"],
+            clip=STYLES[NIO["twins"]["style"]].clip,
+            row=style_text(STYLES[NIO["twins"]["style"]].clip),
+            settings_file=NIO["settings"],
+            settings=learning_settings("ours"),
+            schedule=NIO["schedule"],
+        script:
+            "../scripts/style_twin.py"
+
+    rule figure_identifiability:
+        input:
+            rows=TWIN_STYLES,
+        output:
+            svg=RESULTS / "figures/nio_identifiability.svg",
+            png=RESULTS / "figures/nio_identifiability.png",
+        log:
+            LOGS / "figures/nio_identifiability.log",
+        conda:
+            "../envs/motionstyle.yaml"
+        threads: 1
+        resources:
+            mem_mb=1000,
+        params:
+            library=library("figures/nio.py", "figures/style.py"),
+        script:
+            "../scripts/figure_identifiability.py"

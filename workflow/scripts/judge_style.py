@@ -19,7 +19,7 @@ with job(snakemake.log[0]):
     learning = None
     try:
         learning = load_learning(row, inputs.motion, functions)
-        learnt = load_style(Path(inputs.style)) if "style" in inputs.keys() else None
+        learnt = load_style(Path(inputs.style)) if inputs.get("style") else None
         found = judge_kind(wildcards.kind, learning, learnt, snakemake.params.perturbed)
     except (MotionStyleError, FloatingPointError) as error:
         print(f"failed: {error}")

@@ -15,7 +15,7 @@ with job(snakemake.log[0]):
     row = read_style_row(params.sheet, wildcards.clip)
     settings = read_nio_settings(params.settings_file, inputs.schema)
     functions = load_functions_of(inputs.code, inputs.second_order)
-    budget = len(read_json(Path(inputs.budget))["rows"]) if "budget" in inputs.keys() else 12
+    budget = len(read_json(Path(inputs.budget))["rows"]) if inputs.get("budget") else 12
     kept = {}
 
     def work():

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from motionstyle.evaluation.nio.checks import shoe_curve, spring_curve, two_sided_joints
-from motionstyle.figures.style import SERIES, new_figure, series_style, styled
+from motionstyle.figures.style import SERIES, blank_figure, new_figure, series_style, styled
 from motionstyle.spacetime.style import JOINTS_29, Style
 
 Curve = Mapping[str, Sequence[float]]
@@ -158,4 +158,35 @@ def likelihood_figure(
     right.set_ylim(-3, None)
     right.set_xlabel("temperature τ")
     right.set_ylabel(r"$L_\tau$ (circles: (28); dotted: $G$)")
+    return figure
+
+
+@styled
+def identifiability_figure(twins: Sequence[Mapping[str, Sequence[object]]]) -> Figure:
+    """Return singular values of the optimum's derivative by scaled θ, one curve a twin.
+
+    twins : records with `rows` and `singular_values`, degrees rms per unit of scaled θ.
+    """
+    shown = {}
+    for one in twins:
+        if one["singular_values"]:
+            row = one["rows"][0]
+            shown.setdefault(row["seed"], one["singular_values"])  # type: ignore[index]
+    if not shown:
+        return blank_figure("no twin was made, see the logs")
+    figure = new_figure(2.6, 4.0)
+    axes = figure.subplots()
+    for k, (seed, values) in enumerate(shown.items()):
+        axes.plot(
+            np.arange(1, len(values) + 1), values, lw=1.0, label=f"twin {seed}", **series_style(k)
+        )
+    for level, text in ((1.0, "1° per unit"), (0.1, "0.1° per unit")):
+        axes.axhline(level, color="0.6", lw=0.6, ls=":")
+        axes.annotate(text, (1.0, level), xycoords=("axes fraction", "data"), ha="right",
+                      va="bottom", fontsize="x-small", color="0.4")  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=max(1e-6, min(float(min(v)) for v in shown.values())))
+    axes.set_xlabel("number of the direction of scaled θ (of 147)")
+    axes.set_ylabel("movement of joint angles, deg rms")
+    axes.legend(fontsize="x-small")
     return figure

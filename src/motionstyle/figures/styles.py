@@ -74,9 +74,7 @@ def style_sides_figure(style: Style, initial: Style, title: str) -> Figure:
     axes[0].axvline(1, color="0.8", lw=0.6, zorder=0)
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=4, fontsize="x-small")
-    shoes = (
-        f"shoes {style.shoe_stiffness / 1000:.1f} N/mm, {1000 * style.shoe_rest_length:.1f} mm"
-    )
+    shoes = f"shoes {style.shoe_stiffness / 1000:.1f} N/mm, {1000 * style.shoe_rest_length:.1f} mm"
     figure.suptitle(f"{title}; {shoes}")
     return figure
 
