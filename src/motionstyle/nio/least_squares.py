@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 PREFERENCE_BOUNDS = (0.1, 10.0)  # of 29 α
 
 
-class _Spent(Exception):
+class _SpentError(Exception):
     """The budget is spent."""
 
 
@@ -52,7 +52,7 @@ def learn_by_least_squares(
     def error(y: Array) -> float:
         nonlocal best, about
         if len(rows) >= budget:
-            raise _Spent
+            raise _SpentError
         style = space.style(np.clip(y, low, high), learning.start)
         inner = inner_solve(learning, style, inner_settings, learning.controls)
         row = learning_row(learning, style, target_cost(learning, style), inner)
@@ -72,7 +72,7 @@ def learn_by_least_squares(
 
     try:
         minimize(error, origin, method="Powell", bounds=list(zip(low, high, strict=True)))
-    except _Spent:
+    except _SpentError:
         log(f"{budget} inner solves: budget spent")
     return Learnt(
         replace(best[1], about=dict(learning.start.about) | {"recipe": "least_squares"} | about),

@@ -101,7 +101,7 @@ def learn_preferences(
     settings: PreferenceSettings | None = None,
     log: Callable[[str], None] = print,
 ) -> Learnt:
-    """Return the style of preferences alone for which X_T is nearest to optimal; rows as others'."""
+    """Return the style of preferences alone for which X_T is nearest to optimal."""
     settings = settings or PreferenceSettings()
     began = perf_counter()
     empty = np.zeros_like(learning.start.vector())
