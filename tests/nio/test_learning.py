@@ -1,11 +1,13 @@
 """Learning styles: derivatives against differences, G against its definition, twins, bad input."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from motionstyle.errors import MotionStyleError
+from motionstyle.evaluation.nio.records import check_projection
 from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
 from motionstyle.nio.inner import InnerSettings, inner_solve
 from motionstyle.nio.learning_problem import (
@@ -58,7 +60,7 @@ def step_of(style, k):
 
 
 def test_the_projected_motion_obeys_newton_and_g_is_not_negative(made_learning, style, solved):
-    values = target_cost(made_learning, style, GAIN).values
+    values = target_cost(made_learning, made_learning.start).values
     assert np.abs(values.root).max() < ROOT_LIMIT_N
     gap = target_cost(made_learning, style, GAIN).total - solved.cost.total
     assert gap >= 0
@@ -143,11 +145,11 @@ def test_at_an_exact_solution_g_and_its_gradient_vanish(made_learning, style, so
 
 
 def test_the_papers_objective_never_rises(made_learning):
-    settings = PaperSettings(iterations=3, inner_iterations=25)
+    settings = PaperSettings(iterations=1, inner_iterations=12)
     found = learn_as_paper(made_learning, settings, quiet)
     objectives = [row["objective"] for row in found.rows]
     assert len(objectives) >= 2
-    assert all(b <= a for a, b in zip(objectives, objectives[1:], strict=False))
+    assert all(b <= a for a, b in pairwise(objectives))
     assert found.style.vector().shape == (SIZE,)
 
 
@@ -185,9 +187,10 @@ def test_the_next_preferences_are_least_in_the_highest_plane():
 
 
 def test_preferences_alone_lower_g(made_learning):
-    found = learn_preferences(made_learning, PreferenceSettings(rounds=3), quiet)
+    found = learn_preferences(made_learning, PreferenceSettings(rounds=2), quiet)
     accepted = [row["objective"] for row in found.rows if row["accepted"]]
-    assert accepted[-1] == min(row["objective"] for row in found.rows)
+    assert accepted == sorted(accepted, reverse=True)
+    assert accepted[-1] == min(r["objective"] for r in found.rows if r["optimality"] < 1)
     assert not found.style.vector()[29:].any()
     assert found.style.preferences.sum() == pytest.approx(1)
 
@@ -198,11 +201,15 @@ def test_a_motion_without_forces_teaches_no_style(made_walk, all_functions):
 
 
 def test_a_window_without_its_contacts_is_refused(made_walk, all_functions):
-    """Nothing holds the body up, yet it does not fall."""
+    """Nothing holds the body up, so that the motion nearest to it falls."""
     afloat = replace(
         made_walk,
         contacts=np.zeros_like(made_walk.contacts),
         contact_forces=np.zeros_like(made_walk.contact_forces),
     )
     with pytest.raises(MotionStyleError, match="choose a window without wrong contacts"):
-        learning_problem(afloat, all_functions)
+        check_projection(learning_problem(afloat, all_functions))
+
+
+def test_a_walk_is_near_one_that_obeys_the_dynamics(made_learning):
+    check_projection(made_learning)

@@ -17,6 +17,9 @@ from motionstyle.nio.learning_problem import LearningProblem, learning_problem
 from motionstyle.nio.styles_sheet import StyleRow
 from motionstyle.tables import plain
 
+# Farther than this from its fit a motion is another one: it fell, or a foot let go.
+FARTHEST_MM, FARTHEST_DEG = 50.0, 5.0
+
 
 def load_functions_of(code: str | Path, second_order: str | Path) -> dict[str, FrameFunction]:
     """Return the compiled functions that learning needs."""
@@ -34,7 +37,27 @@ def load_learning(
     MotionStyleError
         If the window is not inside the motion, or see `learning_problem`.
     """
-    return learning_problem(row.window(load_motion(motion)), functions)
+    learning = learning_problem(row.window(load_motion(motion)), functions)
+    check_projection(learning)
+    return learning
+
+
+def check_projection(learning: LearningProblem) -> None:
+    """Refuse a captured motion that had to be moved far to obey the dynamics in its contacts.
+
+    Raises
+    ------
+    MotionStyleError
+        If it was.
+    """
+    found = learning.projection
+    if found.place_rms_mm > FARTHEST_MM or found.angle_rms_deg > FARTHEST_DEG:
+        raise MotionStyleError(
+            f"motion {learning.captured.id}: the nearest motion that obeys the dynamics in its "
+            f"contacts lies {found.place_rms_mm:.0f} mm and {found.angle_rms_deg:.1f}° away "
+            f"(limits {FARTHEST_MM:.0f} mm, {FARTHEST_DEG:.0f}°); choose a window without wrong "
+            "contacts"
+        )
 
 
 def learning_record(row: StyleRow, algorithm: str, work: Callable[[], Any]) -> dict[str, Any]:
