@@ -271,7 +271,7 @@ class InteriorPoint:
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
             moved, found, length = self._moved(here, step)
-        if not np.isfinite(found.energy):
+        if not np.isfinite(found.residuals).all() or np.abs(found.residuals).max() > 1e100:
             return None
         before = self.system.error(here.point, values, slopes, here.barrier)
         after = self.system.error(moved, found, self.evaluator.slopes(found), here.barrier)

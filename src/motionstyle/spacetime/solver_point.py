@@ -32,7 +32,7 @@ class SolverSettings:
     """
 
     tolerance: float = 1e-6
-    iterations: int = 250
+    iterations: int = 400
     seconds: float = 900.0
     barrier: float = 1e-1
     barrier_shrink: float = 0.2
