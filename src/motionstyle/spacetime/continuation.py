@@ -32,7 +32,7 @@ class Stage:
     """A gentler problem on the way.
 
     gain : of the springs' sigmoid, 1/rad. root_share : of the root's own weight. barrier : μ to
-    begin with. tolerance, iterations : where it ends. whole_steps : see `SolverSettings`.
+    begin with. tolerance, iterations : where it ends. pace, whole_steps : see `SolverSettings`.
     """
 
     gain: float
@@ -40,12 +40,13 @@ class Stage:
     barrier: float
     tolerance: float
     iterations: int
+    pace: float = 0.0
     whole_steps: bool = False
 
 
 STAGES = (
-    Stage(20.0, 0.01, 1e-1, 0.1, 40, whole_steps=True),
-    Stage(100.0, 0.01, 1e-3, 0.05, 60),
+    Stage(20.0, 0.01, 1e-1, 0.1, 120, pace=0.1, whole_steps=True),
+    Stage(100.0, 0.01, 1e-3, 0.05, 80, pace=0.02),
 )
 LAST_BARRIER = 1e-3
 
@@ -92,6 +93,7 @@ def solve_spacetime(
                 tolerance=max(settings.tolerance, stage.tolerance),
                 iterations=min(settings.iterations, stage.iterations),
                 barrier=stage.barrier,
+                pace=stage.pace,
                 whole_steps=stage.whole_steps,
                 seconds=max(0.0, settings.seconds - seconds),
             ),
