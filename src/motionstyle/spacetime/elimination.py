@@ -71,7 +71,7 @@ def eliminate(
             lowers.append(np.zeros((0, 0)))
             continue
         lower, info = dpotrf(inner[t][np.ix_(at, at)].T, lower=1, overwrite_a=1)
-        if info:
+        if info or not np.isfinite(lower[-1, -1]):
             raise FloatingPointError("the Newton matrix has entries that are not finite")
         found = dtrsm(1.0, lower, cross[t][:, at].T, lower=1)
         dgemm(-1.0, found, found, beta=1.0, c=hessian[t].T, trans_a=1, overwrite_c=1)
