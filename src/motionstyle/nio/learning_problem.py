@@ -196,7 +196,7 @@ def learning_problem(
         target=target,
         controls=found.point.controls,
         coordinates=values.coordinates,
-        feet=feet,
+        feet=captured_constraints(target, "path"),  # which X_T now keeps to the last
         ranges=ranges,
         start=replace(style, about=about),
         projection=projection,
