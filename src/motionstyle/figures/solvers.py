@@ -39,6 +39,7 @@ def solver_figure(problems: Sequence[Mapping[str, Any]]) -> Figure:
         axes.set_visible(False)
     for axes in grid[:, 0]:
         axes.set_ylabel("E / best E")
-    for axes in grid[-1]:
-        axes.set_xlabel("seconds")
+    for k, axes in enumerate(grid.flat[: len(drawn)]):
+        if k + columns >= len(drawn):  # nothing drawn below it
+            axes.set_xlabel("seconds")
     return figure

@@ -29,6 +29,7 @@ COLUMNS = (
     *("config", "motion", "frames", "status", "E", "iterations", "seconds", "ms_per_iteration"),
     *("ms_per_iteration_and_frame", "growth_exponent", "peak_memory_mb"),
     *("warm_status", "warm_E", "warm_iterations", "warm_seconds", "warm_over_cold"),
+    "reason",
 )
 
 
@@ -131,8 +132,8 @@ def with_exponents(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     for row in sorted(rows, key=lambda row: row["frames"]):
         made = dict(row)
-        if found:
-            last = found[-1]
+        last = found[-1] if found else {}
+        if "ms_per_iteration" in last and "ms_per_iteration" in row:
             slower = np.log(row["ms_per_iteration"] / last["ms_per_iteration"])
             made["growth_exponent"] = float(slower / np.log(row["frames"] / last["frames"]))
         found.append(made)

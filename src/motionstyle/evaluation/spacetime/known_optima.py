@@ -35,7 +35,6 @@ from motionstyle.spacetime.spacetime_problem import COUNT, POINTS, Evaluator, Sp
 from motionstyle.spacetime.style import JOINTS_29, Style
 
 Array = NDArray[np.float64]
-TEST = "analytic_optimum"
 KEPT = 3
 # One second each. Flights at the paper's rate; the mass finer, because at 30 Hz the splines alone
 # cost 0.15 % of E on the spring. The number of intervals is even, see `_sliding`.
