@@ -195,7 +195,10 @@ def _sliding(
 
 
 def _rest_to_rest(t: Array, spring: float, damper: float) -> tuple[Array, Array]:
-    """Return x (m) and u = m ẍ + c ẋ + k x (N) of least ∫u² from rest at 0 to rest at d."""
+    """Return x (m) and u = m ẍ + c ẋ + k x (N) of least ∫u² from rest at 0 to rest at d.
+
+    Both spring and damper, or neither: undamped roots are double ones.
+    """
     if spring == damper == 0:
         s, span = t / t[-1], t[-1]
         x = DISTANCE_M * (3 * s**2 - 2 * s**3)
