@@ -232,9 +232,7 @@ def test_twins_are_recovered_from_named_starts(walk, style, all_functions, tmp_p
     plan = make_plan(ROW, walk, *planned_footprints(ROW, walk))
     theta = random_style(style, 7)
     few = SolverSettings(iterations=2)
-    target, rows = twin_rows(
-        ROW, plan, theta, all_functions, ["perturbed_1", "paper"], few, quiet
-    )
+    target, rows = twin_rows(ROW, plan, theta, all_functions, ["perturbed_1", "paper"], few, quiet)
     assert (target.id, target.kind) == ("made_twin7", "planted")
     assert [row["test"] for row in rows] == [TEST, TEST_PAPER]
     assert [row["seed"] for row in rows] == [7, 7]

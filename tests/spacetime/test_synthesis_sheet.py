@@ -200,7 +200,7 @@ def test_a_limp_starts_with_the_knee_locked(tmp_path, example):
 
 
 def test_a_style_of_the_users_own_is_named_by_its_path(tmp_path):
-    with pytest.raises(MotionStyleError, match=r"style: there is no file .*mine\.json; paths begin"):
+    with pytest.raises(MotionStyleError, match=r"style: there is no file .*mine\.json; paths"):
         one(tmp_path, style="mine.json")
     (tmp_path / "mine.json").write_text("{}")
     row = one(tmp_path, style="mine.json")

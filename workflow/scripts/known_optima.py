@@ -18,7 +18,5 @@ with job(snakemake.log[0]):
     functions |= load_functions(second_order_functions, Path(inputs.second_order))
     problems = known_optima(load_motion(inputs.motion).body, functions)
     rows = [known_optimum_row(known, seed=1, log=print) for known in problems]
-    write_table(
-        snakemake.output.table, COLUMNS, [{"config": params.config, **row} for row in rows]
-    )
+    write_table(snakemake.output.table, COLUMNS, [{"config": params.config, **row} for row in rows])
     write_json(Path(snakemake.output.rows), {"rows": [optimum_row(row) for row in rows]})

@@ -62,8 +62,8 @@ def hand_style(path: str | Path, motion: Motion) -> Style:
     ]
     top = {key: _number(content, key, faults, least=0.0) for key in TOP_KEYS if key != "joints"}
     groups = {}
-    for pattern, entry in content["joints"].items():
-        entry = entry if isinstance(entry, dict) else {}
+    for pattern, given in content["joints"].items():
+        entry = given if isinstance(given, dict) else {}
         inner: list[str] = []
         groups[str(pattern)] = {
             name: _number(entry, name, inner, least=None if name == "rest_deg" else 0.0)

@@ -1,8 +1,8 @@
 """How a solve grows with the length of the motion, and what a re-solve costs.
 
-A stretch of a walk is repeated to any length: copies of the stretch that follow each other on the
-root's way, the small difference between its ends spread evenly over it. Such a motion is no capture;
-it is made to time a solver on.
+A stretch of a walk is repeated to any length: copies of the stretch follow each other on the root's
+way, the small difference between its ends spread evenly over it. Such a motion is no capture; it is
+made to time a solver on.
 """
 
 from __future__ import annotations

@@ -102,9 +102,7 @@ def solve_choice(
         "E_target": start.energy,
     }
     found, record, _diagnosis = checked_solve(
-        lambda: outcome_of(
-            problem, solve_spacetime(problem, target, settings=settings, log=log)
-        ),
+        lambda: outcome_of(problem, solve_spacetime(problem, target, settings=settings, log=log)),
         log,
     )
     row |= {k: getattr(record, k) for k in ("status", "optimality", "iterations", "seconds")}
@@ -122,7 +120,8 @@ def solve_choice(
         "G": gap,
         "G_over_E_target": gap / start.energy,
         "root_share_of_E_pct": 100 * terms["root"] / values.energy,
-        "foot_error_mm": 1000 * float(np.abs(values.foot_residuals).max())
+        "foot_error_mm": 1000
+        * float(np.abs(values.foot_residuals).max())
         / np.sqrt(problem.settings.foot_weight),
         "joint_rms_deg": float(np.degrees(np.sqrt((away**2).mean()))),
     }

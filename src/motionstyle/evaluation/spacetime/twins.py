@@ -82,9 +82,7 @@ def twin_rows(
     rows = []
     for name in starts:
         start = start_near(target, plan, name)
-        found = synthesise(
-            row, plan, style, functions, settings=settings, start=start, log=log
-        )
+        found = synthesise(row, plan, style, functions, settings=settings, start=start, log=log)
         rows.append(
             {
                 "test": TEST_PAPER if name == "paper" else TEST,
