@@ -8,14 +8,16 @@ same problem. Energies under other root weights or knots are other energies: com
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motionstyle.body.kinematics import contact_points
 from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.codegen import FrameFunction
+from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.diagnosis import checked_solve
@@ -26,7 +28,7 @@ from motionstyle.spacetime.learning_problem import (
 )
 from motionstyle.spacetime.outcome import outcome_of
 from motionstyle.spacetime.solver_point import SolverSettings
-from motionstyle.spacetime.spacetime_problem import Evaluator, SpacetimeSettings
+from motionstyle.spacetime.spacetime_problem import Evaluator, SpacetimeProblem, SpacetimeSettings
 from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
@@ -49,6 +51,8 @@ class Choice:
     value: str
     weights: Mapping[str, float] = field(default_factory=dict)
     problem: Mapping[str, Any] = field(default_factory=dict)
+    fit_shoes: bool = False
+    fit_forces: bool = False
 
 
 BASE = "base"
@@ -64,7 +68,12 @@ CHOICES: dict[str, Choice] = {
     "friction_0.5": Choice("friction", "0.5", problem={"friction": 0.5}),
     "friction_1.0": Choice("friction", "1.0", problem={"friction": 1.0}),
     "knots_3": Choice("frames per knot", "3", {"frames_per_knot": 3.0}),
+    "shoes_of_fit": Choice("shoes", "of the physics fit", fit_shoes=True),
+    "forces_of_fit": Choice(
+        "shoes, and where feet push", "of the physics fit", fit_shoes=True, fit_forces=True
+    ),
 }
+LEAST_FORCE_N = 0.5  # of the physics fit that counts as pushing
 
 
 @dataclass(frozen=True)
@@ -74,6 +83,45 @@ class Solved:
     row: dict[str, Any]
     target: Array
     optimum: Array
+
+
+def choice_problem(
+    motion: Motion, style: Style, functions: Mapping[str, FrameFunction], choice: Choice
+) -> SpacetimeProblem:
+    """Return the learning problem of a motion under one choice.
+
+    Raises
+    ------
+    MotionStyleError
+        If the choice needs what the physics fit did not leave with the motion.
+    """
+    if choice.fit_shoes:
+        shoes = motion.provenance.get("shoes")
+        if not shoes:
+            raise MotionStyleError(f"{motion.id}: its physics fit knows no shoes")
+        style = replace(
+            style,
+            shoe_stiffness=float(shoes["stiffness"]),
+            shoe_rest_length=float(shoes["rest_length"]),
+        )
+    settings = SpacetimeSettings(**choice.weights)
+    problem = learning_problem(motion, style, functions, settings=settings, **choice.problem)
+    if not choice.fit_forces:
+        return problem
+    if motion.contact_forces is None:
+        raise MotionStyleError(f"{motion.id}: its contact forces are unknown")
+    feet = problem.feet
+    held = feet.held | (np.linalg.norm(motion.contact_forces, axis=-1) > LEAST_FORCE_N)
+    paths = contact_points(motion.body, motion.pose())
+    more = (held & ~feet.held)[..., None]
+    feet = replace(
+        feet,
+        held=held,
+        targets=np.where(more, paths, feet.targets),
+        ground=np.where(more, paths, feet.ground),
+        clearance=np.where(held, 0.0, feet.clearance),
+    )
+    return replace(problem, feet=feet)
 
 
 def solve_choice(
@@ -86,9 +134,7 @@ def solve_choice(
 ) -> Solved:
     """Solve the learning problem of one of `CHOICES` from X_T; return its row of the table."""
     chosen = CHOICES[choice]
-    problem = learning_problem(
-        motion, style, functions, settings=SpacetimeSettings(**chosen.weights), **chosen.problem
-    )
+    problem = choice_problem(motion, style, functions, chosen)
     evaluator = Evaluator(problem)
     target = evaluator.basis.fit(motion.coordinates)
     coefficients = best_coefficients(evaluator, target)
