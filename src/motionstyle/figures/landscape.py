@@ -11,8 +11,8 @@ from motionstyle.figures.style import new_figure, series_style, styled
 
 # Label, and the number of the series' style (black is the total's).
 TERMS = {
-    "muscles": ("muscles, Σ α Q_m²", 0),
-    "root": ("root residual, w_r Σ Q_0²", 1),
+    "muscles": (r"muscles, $\Sigma\,\alpha\,Q_m^2$", 0),
+    "root": (r"root residual, $w_r\,\Sigma\,Q_0^2$", 1),
     "feet": ("held feet off their targets", 2),
     "ranges": ("beyond joint ranges", 3),
     "clearance": ("swinging feet below ground", 5),
