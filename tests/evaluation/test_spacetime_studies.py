@@ -85,7 +85,8 @@ def test_no_other_way_from_rest_to_rest_takes_less_force(spring, damper):
     t = np.linspace(0, 1, 4001)
     x, u = _rest_to_rest(t, spring, damper)
     assert x[[0, -1]] == pytest.approx([0, 1], abs=1e-9)
-    speed, force = np.gradient(x, t), np.gradient(np.gradient(x, t), t)
+    speed = np.gradient(x, t, edge_order=2)
+    force = np.gradient(speed, t)
     assert speed[[0, -1]] == pytest.approx([0, 0], abs=2e-3)
     inside = slice(5, -5)
     by_hand = MASS_KG * force + damper * speed + spring * x
