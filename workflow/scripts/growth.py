@@ -10,6 +10,7 @@ from motionstyle.evaluation.spacetime.growth import growth_row
 from motionstyle.files import write_json
 from motionstyle.jobs import job
 from motionstyle.motion.storage import load_motion
+from motionstyle.spacetime.solver_point import SolverSettings
 from motionstyle.spacetime.synthesis import initial_style_of
 
 with job(snakemake.log[0]):
@@ -20,7 +21,9 @@ with job(snakemake.log[0]):
         functions = load_functions(dynamics_functions, Path(inputs.code))
         functions |= load_functions(second_order_functions, Path(inputs.second_order))
         style = initial_style_of(stretch, functions)
-        row = growth_row(stretch, style, functions, frames, study["iterations"])
+        whole = frames <= study["to_the_end"]
+        iterations = SolverSettings.iterations if whole else study["iterations"]
+        row = growth_row(stretch, style, functions, frames, iterations)
     except MotionStyleError as error:
         print(f"failed: {error}")
         row = {"motion": study["clip"], "frames": frames, "status": "failed"}
