@@ -257,9 +257,17 @@ def motion_files():
 
 
 def made_motions():
-    """Return the motions of the kinds that are judged against their example."""
+    """Return the motions of the kinds that are judged against their example.
+
+    Styles set by hand or at random are not the example's, so that theirs are not.
+    """
     kinds = SIMILARITY["judge"]["kinds"]
-    return [file for file in motion_files() if file.parent.name in kinds]
+    foreign = {id for id, row in SYNTHESES.items() if row.recipe in ("hand", "twin")}
+    return [
+        file
+        for file in motion_files()
+        if file.parent.name in kinds and file.stem.removesuffix("_copied") not in foreign
+    ]
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
