@@ -32,15 +32,13 @@ from motionstyle.evaluation.spacetime.twins import TEST, TEST_PAPER, start_near,
 from motionstyle.figures.landscape import landscape_figure
 from motionstyle.files import write_json
 from motionstyle.motion.resample import resample
-from motionstyle.spacetime.edits import Edits
-from motionstyle.spacetime.learning_problem import (
-    best_coefficients,
-    learning_problem,
-    objective_terms,
-)
+from motionstyle.nio.learning_problem import LearningProblem, Projection
+from motionstyle.spacetime.edits import Edits, edit_ranges
+from motionstyle.spacetime.footprint_constraints import captured_constraints
 from motionstyle.spacetime.made_styles import random_style
+from motionstyle.spacetime.objective import best_coefficients, objective_terms
 from motionstyle.spacetime.solver_point import SolverSettings
-from motionstyle.spacetime.spacetime_problem import Evaluator
+from motionstyle.spacetime.spacetime_problem import Evaluator, SpacetimeSettings
 from motionstyle.spacetime.synthesis import initial_style_of
 from motionstyle.spacetime.synthesis_plan import make_plan, planned_footprints
 from motionstyle.spacetime.synthesis_sheet import FootprintSource, SynthesisRow
@@ -76,6 +74,24 @@ def walk(stretch):
 @pytest.fixture(scope="module")
 def style(walk, all_functions):
     return initial_style_of(walk, all_functions)
+
+
+@pytest.fixture(scope="module")
+def learning(walk, style, all_functions):
+    """The walk's learning problem as if it were feasible: no solve."""
+    moved = replace(walk, coordinates=walk.coordinates + 1e-3)
+    return LearningProblem(
+        captured=moved,
+        target=walk,
+        controls=np.zeros(0),
+        coordinates=walk.coordinates,
+        feet=captured_constraints(walk),
+        ranges=edit_ranges(walk, Edits()),
+        start=style,
+        projection=Projection("converged", 0.0, 0.0, 0.0, 0.0),
+        functions=all_functions,
+        settings=SpacetimeSettings(),
+    )
 
 
 # ---------------------------------------------------------------------------------- known optima
@@ -123,15 +139,13 @@ def test_flights_are_free(plain_body, all_functions):
     assert row["relative_to"] == "E_start"
 
 
-# ------------------------------------------------------------------------------ learning problem
-def test_the_motion_itself_is_feasible_and_its_forces_the_best(walk, style, all_functions):
-    problem = learning_problem(walk, style, all_functions)
+# ------------------------------------------------------------------------------- the objective
+def test_the_forces_of_a_motion_are_the_best(walk, learning):
+    problem = learning.problem(learning.start)
     evaluator = Evaluator(problem)
     controls = evaluator.basis.fit(walk.coordinates)
     found = best_coefficients(evaluator, controls)
     values = evaluator.values(controls, found)
-    assert np.abs(values.foot_residuals).max() / np.sqrt(1e7) < 2e-3  # what splines smooth away
-    assert values.inequalities[evaluator.row_active].min() > -0.2  # 2 mm in units of 1 cm
     assert (found >= 0).all()
     assert (found[~evaluator.bearing] == 0).all()
     empty = evaluator.values(controls, np.zeros_like(found))
@@ -148,8 +162,8 @@ def test_the_motion_itself_is_feasible_and_its_forces_the_best(walk, style, all_
     assert terms["feet"] == pytest.approx((values.foot_residuals**2).sum())
 
 
-def test_terms_tell_what_leaving_the_ranges_costs(walk, style, all_functions):
-    problem = learning_problem(walk, style, all_functions)
+def test_terms_tell_what_leaving_the_ranges_costs(walk, learning):
+    problem = learning.problem(learning.start)
     evaluator = Evaluator(problem)
     q = walk.coordinates.copy()
     q[:, 6] = problem.ranges[6, 1] + 0.01
@@ -166,11 +180,11 @@ def test_every_choice_of_the_problem_may_be_configured():
     assert known == list(sensitivity.CHOICES)
 
 
-def test_choices_change_the_problem_they_name(walk, style, all_functions):
+def test_choices_change_the_problem_they_name(learning):
     few = SolverSettings(iterations=1)
     rows = {}
     for name in ("base", "ends_kept", "root_10"):
-        solved = sensitivity.solve_choice(walk, style, all_functions, name, few, quiet)
+        solved = sensitivity.solve_choice(learning, name, few, quiet)
         assert set(solved.row) <= set(sensitivity.COLUMNS)
         assert solved.row["status"] == "not converged"
         gap = solved.row["E_target"] - solved.row["E_optimum"]
@@ -183,11 +197,28 @@ def test_choices_change_the_problem_they_name(walk, style, all_functions):
     assert (base.optimum[:3] != base.target[:3]).any()
 
 
-def test_the_landscape_starts_at_the_motion_and_its_terms_add_up(walk, style, all_functions):
-    problem = learning_problem(walk, style, all_functions)
+def test_every_choice_changes_what_it_says(learning):
+    base = sensitivity.choice_problem(learning, sensitivity.CHOICES["base"])
+    assert base.settings == SpacetimeSettings()
+    for name, choice in sensitivity.CHOICES.items():
+        made = sensitivity.choice_problem(learning, choice)
+        ours, theirs = vars(made.settings), vars(base.settings)
+        weights = {weight for weight in ours if ours[weight] != theirs[weight]}
+        assert weights == set(choice.weights), name
+        assert (made.feet.friction != base.feet.friction).any() == ("friction" in name)
+        assert (made.feet.clearance != base.feet.clearance).any() == (name == "no_clearance")
+        assert np.isfinite(made.ranges[6:]).all() == (name != "no_ranges")
+        assert (made.keep_ends == 3) == (name == "ends_kept")
+    assert [name for name, choice in sensitivity.CHOICES.items() if not choice.projected] == [
+        "not_projected"
+    ]
+
+
+def test_the_landscape_starts_at_the_motion_and_its_terms_add_up(walk, learning):
+    problem = learning.problem(learning.start)
     evaluator = Evaluator(problem)
     target = evaluator.basis.fit(walk.coordinates)
-    found = landscape(walk, style, all_functions, target, target + 0.01)
+    found = landscape(problem, target, target + 0.01)
     at = int(np.argmin(np.abs(found["s"])))
     assert found["s"][at] == pytest.approx(0, abs=1e-12)
     terms = [name for name in found if name not in ("s", "total")]

@@ -11,8 +11,8 @@ from motionstyle.evaluation.spacetime.sensitivity import BASE, solve_choice
 from motionstyle.files import write_json
 from motionstyle.jobs import job
 from motionstyle.motion.storage import load_motion
+from motionstyle.nio.learning_problem import learning_problem
 from motionstyle.spacetime.solver_point import SolverSettings
-from motionstyle.spacetime.synthesis import initial_style_of
 
 with job(snakemake.log[0]):
     inputs, study = snakemake.input, snakemake.params.study
@@ -22,9 +22,9 @@ with job(snakemake.log[0]):
         motion = load_motion(inputs.motion).window(study["first_frame"], study["last_frame"])
         functions = load_functions(dynamics_functions, Path(inputs.code))
         functions |= load_functions(second_order_functions, Path(inputs.second_order))
-        style = initial_style_of(motion, functions)
+        learning = learning_problem(motion, functions)
         settings = SolverSettings(iterations=study["iterations"])
-        solved = solve_choice(motion, style, functions, choice, settings)
+        solved = solve_choice(learning, choice, settings)
     except MotionStyleError as error:
         print(f"failed: {error}")
         failed = {"motion": study["clip"], "choice": choice, "status": "failed"}

@@ -20,8 +20,10 @@ from motionstyle.body.rotations import exponential, logarithm, unroll
 from motionstyle.dynamics.codegen import FrameFunction
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.continuation import solve_spacetime
-from motionstyle.spacetime.learning_problem import learning_problem
+from motionstyle.spacetime.edits import Edits, edit_ranges
+from motionstyle.spacetime.footprint_constraints import captured_constraints
 from motionstyle.spacetime.solver_point import SolverSettings
+from motionstyle.spacetime.spacetime_problem import SpacetimeProblem
 from motionstyle.spacetime.style import Style
 
 SPRINGS_BY = 1.05  # the small change of θ before a warm re-solve
@@ -92,7 +94,14 @@ def growth_row(
     Peak memory is that of this process, libraries included: measure each length in its own.
     """
     motion = repeated(stretch, frames)
-    problem = learning_problem(motion, style, functions)
+    problem = SpacetimeProblem(
+        body=motion.body,
+        rate_hz=motion.rate_hz,
+        feet=captured_constraints(motion),
+        ranges=edit_ranges(motion, Edits()),
+        style=style,
+        functions=dict(functions),
+    )
     controls = problem.basis().fit(motion.coordinates)
     settings = SolverSettings(iterations=iterations)
     cold = solve_spacetime(problem, controls, settings=settings, log=log)

@@ -7,39 +7,24 @@ that what is drawn is a function of the motion alone.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.dynamics.codegen import FrameFunction
-from motionstyle.motion.motion import Motion
-from motionstyle.spacetime.learning_problem import (
-    best_coefficients,
-    learning_problem,
-    objective_terms,
-)
-from motionstyle.spacetime.spacetime_problem import Evaluator
-from motionstyle.spacetime.style import Style
+from motionstyle.spacetime.objective import best_coefficients, objective_terms
+from motionstyle.spacetime.spacetime_problem import Evaluator, SpacetimeProblem
 
 Array = NDArray[np.float64]
 BEYOND, STEPS = 0.25, 61
 
 
-def landscape(
-    motion: Motion,
-    style: Style,
-    functions: Mapping[str, FrameFunction],
-    target: Array,
-    optimum: Array,
-) -> dict[str, list[float]]:
+def landscape(problem: SpacetimeProblem, target: Array, optimum: Array) -> dict[str, list[float]]:
     """Return `s` and the terms of the objective there, see `objective_terms`, and their `total`.
 
     Parameters
     ----------
     target, optimum : control points (K, 35) of X_T (s = 0) and X_S (s = 1).
     """
-    evaluator = Evaluator(learning_problem(motion, style, functions))
+    evaluator = Evaluator(problem)
     rows = []
     for s in np.linspace(-BEYOND, 1 + BEYOND, STEPS):
         controls = target + s * (optimum - target)
