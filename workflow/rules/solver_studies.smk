@@ -20,7 +20,8 @@ rule sensitivity:
     params:
         library=library(
             *("body", "motion", "dynamics", "spacetime", "evaluation/spacetime/sensitivity.py"),
-            "evaluation/spacetime/landscape.py", "nio/learning_problem.py",
+            "evaluation/spacetime/landscape.py",
+            "nio/learning_problem.py",
         ),
         study={name: STUDY[name] for name in STUDY if name not in ("choices", "growth")},
     script:
