@@ -32,5 +32,5 @@ with job(snakemake.log[0]):
     else:
         found["rows"] = [solved.row]
         if choice == BASE:
-            found["landscape"] = landscape(motion, style, functions, solved.target, solved.optimum)
+            found["landscape"] = landscape(solved.problem, solved.target, solved.optimum)
     write_json(Path(snakemake.output.rows), found)
