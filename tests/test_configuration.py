@@ -16,7 +16,7 @@ SCHEMA = ROOT / "workflow" / "schemas" / "config.schema.json"
 NAMES = (
     *("motions.tsv", "datasets.tsv", "embedded.yaml", "claims.yaml"),
     *("planted.yaml", "normative_gait.yaml", "syntheses.tsv"),
-    *("similarity.yaml", "adaptations.tsv", "style_machines.yaml"),
+    *("similarity.yaml", "adaptations.tsv", "style_machines.yaml", "hand_style.yaml"),
 )
 
 

@@ -72,3 +72,18 @@ def test_ipopt_s_point_is_an_optimum_in_our_measure(evaluator, theirs):
     assert result.iterations <= 25
     assert np.abs(result.point.controls - theirs.controls).max() < 1e-3
     assert result.point.coefficients * FORCE_UNIT == pytest.approx(theirs.coefficients, abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("option", "status"),
+    [
+        ({"max_wall_time": 1e-3}, "Maximum_WallTime_Exceeded"),
+        ({"linear_solver": "ma57"}, "Invalid_Option"),
+    ],
+)
+def test_faults_08_09_ipopt_s_limits_and_an_absent_linear_solver_are_told(
+    evaluator, controls, option, status
+):
+    """CasADi returns a point without a word; whether it is one to use stands in the status."""
+    found = IpoptReferee(evaluator, **option).solve(controls, 20.0 * evaluator.bearing)
+    assert found.status == status

@@ -84,6 +84,11 @@ def test_designs_are_measured_by_the_best_of_all(problem, standing, synthetic_st
     axes = solver_figure([found]).axes[0]
     assert len(axes.get_lines()) == 3  # two starts and the line 1 % above the best
     assert axes.get_title() == "standing"
+    bottom = [a.get_xlabel() for a in solver_figure([found] * 5).axes]
+    assert bottom == ["", "", "seconds", "seconds", "seconds", ""]  # the last panel is empty
+    near = [row for row in converged if row["within_1_pct"]]
+    assert near == [row for row in converged if row["above_best_pct"] <= 1]
+    assert not any(row["within_1_pct"] for row in found["rows"] if row not in converged)
 
 
 @pytest.fixture

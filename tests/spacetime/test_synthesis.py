@@ -12,11 +12,18 @@ from motionstyle.dynamics.codegen import load_functions
 from motionstyle.dynamics.functions import dynamics_functions
 from motionstyle.dynamics.second_order import second_order_functions
 from motionstyle.errors import MotionStyleError
+from motionstyle.files import read_json, write_json
 from motionstyle.motion.resample import resample
 from motionstyle.spacetime.continuation import STAGES
 from motionstyle.spacetime.edits import Edits
 from motionstyle.spacetime.solver_point import SolverSettings
-from motionstyle.spacetime.synthesis import USUAL_SHOES, initial_style_of, synthesise
+from motionstyle.spacetime.style import JOINTS_29, load_style, save_style
+from motionstyle.spacetime.synthesis import (
+    USUAL_SHOES,
+    initial_style_of,
+    spacetime_problem,
+    synthesise,
+)
 from motionstyle.spacetime.synthesis_plan import make_plan, planned_footprints
 from motionstyle.spacetime.synthesis_sheet import FootprintSource, SynthesisRow
 from synthetic_walk import make_walk
@@ -69,6 +76,25 @@ def test_a_few_iterations_give_a_motion_with_forces_and_an_honest_status(walk, f
     assert found.report["iterations"] == 5 * (len(STAGES) + 1)
     assert len(found.trace) == 6 * (len(STAGES) + 1)  # and their starts
     assert found.diagnosis["terms"]["muscles"] > 0
+
+
+def test_a_style_edited_in_its_file_is_used_as_edited(walk, functions, tmp_path):
+    """A user edits one number of a style's JSON file, and nothing is learnt again."""
+    row = row_of()
+    plan = make_plan(row, walk, *planned_footprints(row, walk))
+    path = tmp_path / "mine.json"
+    save_style(path, initial_style_of(walk, functions))
+    content = read_json(path)
+    content["parameters"]["rest_angle.head_flexion"]["value"] = 0.3
+    content["about"]["body_mass_kg"] = 3 * walk.body.mass
+    write_json(path, content)
+    edited = load_style(path)
+    problem = spacetime_problem(row, plan, edited, functions)
+    head = list(JOINTS_29).index("head_flexion")
+    assert problem.style.passive.rest_angle[head] == 0.3
+    settings = SolverSettings(iterations=1)
+    found = synthesise(row, plan, edited, functions, settings=settings, log=lambda _text: None)
+    assert "was made for a body of" in found.report["style_warning"]
     assert np.isfinite([step["energy"] for step in found.trace]).all()
     height = centre_of_mass(found.motion.body, found.motion.pose())[:, 1]
     assert height.min() > 0.5

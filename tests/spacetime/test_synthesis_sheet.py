@@ -197,3 +197,15 @@ def test_a_limp_starts_with_the_knee_locked(tmp_path, example):
     assert np.abs(knee - 5).max() <= 0.5 + 1e-9
     copied = np.degrees(plan.copied.coordinates[:, COORDINATE_INDEX["knee_flexion_l"]])
     assert np.ptp(copied) > 20
+
+
+def test_a_style_of_the_users_own_is_named_by_its_path(tmp_path):
+    with pytest.raises(MotionStyleError, match=r"style: there is no file .*mine\.json; paths"):
+        one(tmp_path, style="mine.json")
+    (tmp_path / "mine.json").write_text("{}")
+    row = one(tmp_path, style="mine.json")
+    assert (row.recipe, row.style_clip) == ("file", "walk")
+    assert row.style_file == tmp_path / "mine.json"
+    assert read_syntheses(sheet(tmp_path, {"style": "mine.json"}), ["walk"])
+    made = one(tmp_path, style="hand:run")
+    assert (made.recipe, made.style_clip, made.style_file) == ("hand", "run", None)

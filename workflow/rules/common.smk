@@ -11,6 +11,7 @@ from snakemake.logging import logger
 import motionstyle
 from motionstyle.configuration import load_config
 from motionstyle.errors import MotionStyleError
+from motionstyle.evaluation.spacetime.sensitivity import CHOICES as SENSITIVITY_CHOICES
 from motionstyle.jobs import check_writable, forget_killed_runs
 from motionstyle.mocap.datasets.doors import read_datasets
 from motionstyle.mocap.planted.variants import read_planted
@@ -24,7 +25,7 @@ ROOT = Path(workflow.basedir)
 PACKAGE = Path(motionstyle.__file__).parent
 PATH_KEYS = (
     *("motions", "datasets", "embedded", "claims", "skeletons", "markersets"),
-    *("planted", "normative", "syntheses", "similarity", "adaptations"),
+    *("planted", "normative", "syntheses", "similarity", "adaptations", "hand_style"),
     "style_machines",
 )
 
@@ -80,6 +81,18 @@ except MotionStyleError as error:
 ONE_OF_EACH_TASK = list({row.task: row.id for row in reversed(SYNTHESES.values())}.values())[::-1]
 # Syntheses on which solver designs are held against each other.
 COMPARED = [id for id in CONFIG["solver_comparison"]["problems"] if id in SYNTHESES]
+# One row with random styles, recovered from elsewhere; and the clip that other studies of the
+# solver are made on. Those whose row or clip this run has not are left out.
+TWINS = CONFIG["twins"]
+STUDY = CONFIG["solver_study"]
+CHOICES = STUDY["choices"] if STUDY["clip"] in CLIPS else []
+KNOWN_TRUTH = [
+    Path(CONFIG["results_root"]) / f"known_truth/{name}.json"
+    for name in (
+        *(["optima"] if STUDY["clip"] in CLIPS else []),
+        *(f"twins_{seed}" for seed in TWINS["seeds"] if TWINS["problem"] in SYNTHESES),
+    )
+]
 # Syntheses on a ramp, each with the one on the level in the same style and window.
 RAMPS = [
     (ramp.id, level.id)
@@ -115,6 +128,7 @@ PHYSICAL = [
     or "nio" in row.experiments
     or id in PLATES
     or any(id in synthesis.clips for synthesis in SYNTHESES.values())
+    or id == STUDY["clip"]
 ]
 
 # Motions that similar pairs are made of. Planted variants stand in for the embedded clips, whose
@@ -136,6 +150,9 @@ wildcard_constraints:
     clip="|".join(CLIPS) or "none",
     planted="|".join(PLANTED) or "none",
     synthesis="|".join(SYNTHESES) or "none",
+    choice="|".join(SENSITIVITY_CHOICES),
+    seed="[0-9]+",
+    frames="[0-9]+",
 
 
 # What the physics fit is made of in its room: other modules there do not touch it.
@@ -217,6 +234,11 @@ def synthesis_motions(row):
     return files
 
 
+def style_of(row):
+    """Return the file of a synthesis's style: the user's own, or one that a rule makes."""
+    return row.style_file or RESULTS / f"styles/{row.recipe}/{row.style_clip}.json"
+
+
 def synthesis_text(id):
     """Return what a synthesis depends on, as text: a change makes it anew."""
     row = SYNTHESES[id]
@@ -235,9 +257,17 @@ def motion_files():
 
 
 def made_motions():
-    """Return the motions of the kinds that are judged against their example."""
+    """Return the motions of the kinds that are judged against their example.
+
+    Styles set by hand or at random are not the example's, so that theirs are not.
+    """
     kinds = SIMILARITY["judge"]["kinds"]
-    return [file for file in motion_files() if file.parent.name in kinds]
+    foreign = {id for id, row in SYNTHESES.items() if row.recipe in ("hand", "twin")}
+    return [
+        file
+        for file in motion_files()
+        if file.parent.name in kinds and file.stem.removesuffix("_copied") not in foreign
+    ]
 
 
 # Every table that claims may be judged on; the ledger is remade when any of them changes.
@@ -251,6 +281,11 @@ TABLES = [
 TABLES += [
     RESULTS / f"tables/{name}.csv" for name in ("syntheses", "ramp_gait", "solver_comparison")
 ]
+
+SOLVER_TABLES = ["known_truth"] if KNOWN_TRUTH else []
+SOLVER_TABLES += ["known_optima", "solver_growth"] if STUDY["clip"] in CLIPS else []
+SOLVER_TABLES += ["spacetime_sensitivity"] if CHOICES else []
+TABLES += [RESULTS / f"tables/{name}.csv" for name in SOLVER_TABLES]
 
 SIMILARITY_TABLES = [
     *("similarity_alignments", "similarity_sets", "leg_subspaces", "leakage", "one_class_svm"),
@@ -271,6 +306,7 @@ FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else [
 # The tables and figures of style machines are added in their rules.
 FIGURES += ["syntheses", "warps"] if SYNTHESES else []
 FIGURES += ["solvers"] if COMPARED else []
+FIGURES += ["landscape"] if "base" in CHOICES else []
 FIGURES += ["similarity_features", "leg_subspaces", "leakage", "discrimination"] if SIMILAR else []
 FIGURES += ["dose_response"] if SIMILAR and PLANTED else []
 FIGURES += ["adaptation_triptych", "adaptation_strips"] if TASKS else []

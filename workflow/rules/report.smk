@@ -155,6 +155,7 @@ rule publish:
                     "solver_comparison",
                 ),
                 *SHMM_TABLES,
+                *SOLVER_TABLES,
                 *(SIMILARITY_TABLES if SIMILAR else ()),
             )
         ],

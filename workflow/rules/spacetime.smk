@@ -76,8 +76,7 @@ rule synthesise:
         unpack(lambda wildcards: synthesis_motions(SYNTHESES[wildcards.synthesis])),
         table=RESULTS / "footprints/{synthesis}.tsv",
         status=RESULTS / "footprints/{synthesis}.json",
-        style=lambda wildcards: RESULTS
-        / "styles/{0.recipe}/{0.style_clip}.json".format(SYNTHESES[wildcards.synthesis]),
+        style=lambda wildcards: style_of(SYNTHESES[wildcards.synthesis]),
         code=RESULTS / "dynamics/library.json",
         second_order=RESULTS / "dynamics/second_order.json",
     output:

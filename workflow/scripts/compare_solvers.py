@@ -30,7 +30,8 @@ with job(snakemake.log[0]):
         functions |= load_functions(second_order_functions, Path(inputs.second_order))
         problem = spacetime_problem(row, plan, load_style(Path(inputs.style)), functions)
         starts = starts_of(plan.start, [name for names in designs.values() for name in names])
-        found = compare_designs(problem, starts, designs, comparison["iterations"])
+        limits = {name: comparison[name] for name in ("iterations", "seconds")}
+        found = compare_designs(problem, starts, designs, **limits)
     except MotionStyleError as error:
         print(f"failed: {error}")
         found = {"rows": [{"design": "", "start": "", "status": "failed", "reason": str(error)}]}

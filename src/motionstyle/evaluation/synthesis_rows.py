@@ -33,7 +33,7 @@ SYNTHESIS_COLUMNS = (
     *("cone_excess_n", "cone_kept", "joint_range_excess_deg", "joint_ranges_kept"),
     *MEASURES,
     *("style_distance_own_deg", "closer_to_own_style", "closer_to_own_subject"),
-    "joint_rms_to_captured_deg",
+    *("joint_rms_to_captured_deg", "style_warning"),
 )
 
 

@@ -31,7 +31,7 @@ def solver_figure(problems: Sequence[Mapping[str, Any]]) -> Figure:
             done = "" if trace["status"] == "converged" else " (not converged)"
             axes.plot(seconds, energy, label=f"{trace['start']}{done}", lw=0.9, **series_style(k))
         axes.set_yscale("log")
-        axes.set_ylim(0.9, 100)
+        axes.set_ylim(0.8, 1e4)  # starts lie far above
         axes.axhline(1.01, color="0.6", lw=0.5)
         axes.set_title(one["rows"][0]["problem"])
         axes.legend(fontsize="x-small")
@@ -39,6 +39,7 @@ def solver_figure(problems: Sequence[Mapping[str, Any]]) -> Figure:
         axes.set_visible(False)
     for axes in grid[:, 0]:
         axes.set_ylabel("E / best E")
-    for axes in grid[-1]:
-        axes.set_xlabel("seconds")
+    for k, axes in enumerate(grid.flat[: len(drawn)]):
+        if k + columns >= len(drawn):  # nothing drawn below it
+            axes.set_xlabel("seconds")
     return figure

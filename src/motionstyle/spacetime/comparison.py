@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 SAME_BASIN = 0.01  # share of E within which two optima count as one
 COLUMNS = (
     *("problem", "task", "frames", "design", "start", "status", "E", "above_best_pct"),
+    "within_1_pct",
     *("optimality", "foot_error_mm", "root_share_of_E_pct", "iterations", "seconds"),
     *("ms_per_iteration", "joint_rms_from_best_deg"),
 )
@@ -44,6 +45,7 @@ def compare_designs(
     starts: Mapping[str, Motion],
     designs: Mapping[str, Sequence[str]],
     iterations: int,
+    seconds: float = SolverSettings.seconds,
     log: Callable[[str], None] = print,
 ) -> dict[str, list[dict[str, Any]]]:
     """Return `rows`, one per design and start, measured by the best E of all, and `traces`.
@@ -52,7 +54,9 @@ def compare_designs(
     ----------
     designs : starts by design: `structured` is our interior-point method, through gentler
         springs first; `ipopt` solves the lifted problem at once.
-    iterations : limit of one solve.
+    iterations, seconds : limits of one solve.
+
+    A row is `within_1_pct` if its solve converged and its E is at most 1 % above the best one.
     """
     evaluator = Evaluator(problem)
     rows, traces, coordinates = [], [], []
@@ -60,14 +64,15 @@ def compare_designs(
         for name in names:
             controls = problem.basis().fit(starts[name].coordinates)
             if design == "structured":
-                settings = SolverSettings(iterations=iterations)
+                settings = SolverSettings(iterations=iterations, seconds=seconds)
                 found = solve_spacetime(problem, controls, settings=settings)
                 end, forces = found.point.controls, found.coefficients
                 status, optimality = found.status, found.optimality
                 steps = [{"seconds": t.seconds, "E": t.energy} for t in found.trace]
                 traces.append({"design": design, "start": name, "status": status, "steps": steps})
             elif design == "ipopt":
-                found = IpoptReferee(evaluator, max_iter=iterations).solve(controls)
+                referee = IpoptReferee(evaluator, max_iter=iterations, max_wall_time=seconds)
+                found = referee.solve(controls)
                 end, forces = found.controls, found.coefficients
                 converged = found.status == "Solve_Succeeded"
                 status, optimality = "converged" if converged else found.status, found.optimality
@@ -97,6 +102,7 @@ def compare_designs(
     best = min(converged or [row["E"] for row in rows])
     at = next(k for k, row in enumerate(rows) if row["E"] == best)
     for row, q in zip(rows, coordinates, strict=True):
+        row["within_1_pct"] = row["status"] == "converged" and row["E"] <= (1 + SAME_BASIN) * best
         away = (q - coordinates[at])[:, 6:]
         row["above_best_pct"] = 100 * (row["E"] / best - 1)
         row["joint_rms_from_best_deg"] = float(np.degrees(np.sqrt((away**2).mean())))

@@ -235,11 +235,11 @@ class IpoptReferee:
         end = x[N_V * frames :].reshape(-1, COUNT)
         coefficients = best[:, N_U : N_U + N_L] * FORCE_UNIT
         final = evaluator.values(end, coefficients)
-        errors = stats["iterations"]
+        errors = stats.get("iterations")  # absent where IPOPT refuses an option
         optimality = max(errors["inf_pr"][-1], errors["inf_du"][-1]) if errors else np.inf
         return RefereeResult(
             str(stats["return_status"]), end, coefficients, final.energy, float(optimality),
-            int(stats["iter_count"]), perf_counter() - began,
+            int(stats.get("iter_count", 0)), perf_counter() - began,
         )  # fmt: skip
 
 

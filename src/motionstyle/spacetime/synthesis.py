@@ -33,6 +33,26 @@ Array = NDArray[np.float64]
 # k_shoe (N/m) and h̄ (m) of initial styles: a soft heel (biomechanics.md §6), since the physics fit
 # knows no shoes.
 USUAL_SHOES = (1e4, 0.01)
+OTHER_BODY = 0.2  # share by which a style's body mass may differ from that of the body it moves
+
+
+def style_warning(style: Style, motion: Motion) -> str:
+    """Return a sentence if a style was made for a body of quite another mass, or an empty text.
+
+    Springs and preferences are absolute numbers, so that those of a heavy body make a light one
+    stiff. A warning, no refusal: styles of other bodies are tried on purpose. A style that does not
+    say what body it was made for is not held against any.
+    """
+    made_for, mass = style.about.get("body_mass_kg"), motion.body.mass
+    if not isinstance(made_for, (int, float)) or isinstance(made_for, bool) or not made_for > 0:
+        return ""
+    if abs(made_for / mass - 1) <= OTHER_BODY:
+        return ""
+    return (
+        f"style of {style.about.get('clip', 'another clip')} was made for a body of "
+        f"{made_for:.3g} kg, {motion.provenance.get('example', motion.id)} has {mass:.3g} kg; "
+        "scale its springs and damping, or take a style of a body like this one"
+    )
 
 
 @dataclass(frozen=True)
@@ -137,6 +157,9 @@ def synthesise(
 
     result, record, diagnosis = checked_solve(run, log)
     report = {k: v for k, v in asdict(record).items() if k != "violations"}
+    report["style_warning"] = style_warning(style, plan.example)
+    if report["style_warning"]:
+        log(f"warning: {report['style_warning']}")
     if result is None:
         return Synthesis(None, report, [], diagnosis)
     values = result.values

@@ -27,7 +27,9 @@ TASKS = (
     *("skating", "body_size", "other_style"),
 )
 MOODS = ("neutral", "sad", "happy", "angry", "other")
+# Recipes of styles: whoever adds one adds a rule that writes `styles/RECIPE/CLIP.json`.
 STYLES = ("initial", "hand", "twin", "paper", "ours")
+OWN_STYLE = "file"  # the recipe of a style that the sheet names by its path
 NAMED_LOADS = {"suitcase": SUITCASE}
 JOINTS = COORDINATES[JOINT_COORDINATES]
 
@@ -73,8 +75,8 @@ class SynthesisRow:
     ----------
     id : name of the motion. experiment : the claim it serves, if it serves one alone.
     task : one of `TASKS`. example : clip whose motion is copied and whose style it is by default.
-    style : `initial`, `hand`, `twin`, or a learner's name, and after a colon the clip it was made
-        from, if that is not the example.
+    style : one of `STYLES`, and after a colon the clip it was made from, if that is not the
+        example; or the path of a style's JSON file, relative to the sheet.
     mood : of the style, one of `MOODS`. footprints, edits : see their types.
     first_frame, last_frame : window of the example's physical motion, both included.
     others : clips whose style or subject it must not resemble more than its own.
@@ -98,13 +100,19 @@ class SynthesisRow:
 
     @property
     def recipe(self) -> str:
-        """How the style was made."""
-        return self.style.split(":")[0]
+        """How the style was made; `file` if the sheet names a style's file."""
+        return OWN_STYLE if is_style_file(self.style) else self.style.split(":")[0]
 
     @property
     def style_clip(self) -> str:
-        """The clip the style was made from."""
-        return self.style.split(":")[1] if ":" in self.style else self.example
+        """The clip the style was made from; of a style's own file, the example."""
+        named = ":" in self.style and self.recipe != OWN_STYLE
+        return self.style.split(":")[1] if named else self.example
+
+    @property
+    def style_file(self) -> Path | None:
+        """The style's own file, if the sheet names one."""
+        return self.folder / self.style if self.recipe == OWN_STYLE else None
 
     @property
     def footprint_clip(self) -> str:
@@ -118,6 +126,11 @@ class SynthesisRow:
         """Every clip that the motion is made from."""
         wanted = (self.example, self.style_clip, self.footprint_clip)
         return tuple(dict.fromkeys(filter(None, wanted)))
+
+
+def is_style_file(style: str) -> bool:
+    """Whether a cell of the column `style` names a file."""
+    return style.lower().endswith(".json")
 
 
 def read_syntheses(
@@ -180,9 +193,14 @@ def read_row(path: str | Path, id: str) -> SynthesisRow:
 def _row(cells: Cells, folder: Path) -> SynthesisRow:
     style = cells.required("style")
     recipe = style.split(":")[0]
-    if style and recipe not in STYLES:
+    if is_style_file(style):
+        if not (folder / style).is_file():
+            cells.problem("style", f"there is no file {folder / style}; paths begin at the sheet")
+    elif style and recipe not in STYLES:
         near = near_matches(recipe, STYLES)
-        cells.problem("style", f"{recipe!r} is not one of {', '.join(STYLES)}{near}")
+        cells.problem(
+            "style", f"{recipe!r} is not one of {', '.join(STYLES)}, nor a path to a .json{near}"
+        )
     cells.required("task")
     row = SynthesisRow(
         id=cells.identifier("id"),
@@ -212,7 +230,7 @@ def _row(cells: Cells, folder: Path) -> SynthesisRow:
 def _check_clips(cells: Cells, row: SynthesisRow, clips: list[str]) -> None:
     columns = (
         ("example", (row.example,)),
-        ("style", (row.style_clip,) if ":" in row.style else ()),
+        ("style", (row.style_clip,) if row.style_clip != row.example else ()),
         ("footprints", (row.footprint_clip,)),
         ("others", row.others),
     )
