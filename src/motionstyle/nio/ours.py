@@ -34,6 +34,7 @@ from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
+MOST_REFUSALS = 4  # in a row, then a stage ends
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
@@ -203,7 +204,7 @@ def learn(
     began = perf_counter()
     rows: list[dict[str, Any]] = []
     state: _State | None = None
-    place = learner.origin
+    place, trust = learner.origin, 1.0
 
     def record(found: _State, stage: Stage, accepted: bool) -> None:
         row = learning_row(learning, found.style, found.target, found.inner)
@@ -224,7 +225,7 @@ def learn(
             # From a neighbour it failed: X_T itself is the safest start there is.
             state = learner.state(place, stage, learning.controls, None)
         record(state, stage, True)
-        state = _stage(learner, state, stage, record)
+        state, trust = _stage(learner, state, stage, trust, record)
         place = state.place
     if state is None:
         raise ValueError("the learner needs at least one stage")
@@ -240,10 +241,10 @@ def _stage(
     learner: _Learner,
     state: _State,
     stage: Stage,
+    trust: float,
     record: Callable[[_State, Stage, bool], None],
-) -> _State:
-    """Return the best state of one stage."""
-    trust = 1.0
+) -> tuple[_State, float]:
+    """Return the best state of one stage, and the trust to go on with."""
     jacobian, controls = learner.linearised(state)
     refused = 0
     for _ in range(stage.steps):
@@ -254,7 +255,7 @@ def _stage(
         record(found, stage, better)
         if not better:
             trust, refused = 0.3 * trust, refused + 1
-            if refused == 3:
+            if refused == MOST_REFUSALS:
                 break
             continue
         gained = 1 - found.objective / state.objective
@@ -262,4 +263,4 @@ def _stage(
         if gained < learner.settings.least_gain:
             break
         jacobian, controls = learner.linearised(state)
-    return state
+    return state, min(1.0, 2 * trust)
