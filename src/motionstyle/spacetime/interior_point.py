@@ -45,7 +45,7 @@ MOST_NONLINEAR = 10.0  # a step that errs by more than ten times its gain is not
 LEAST_DELTA, FIRST_DELTA = 1e-4, 1e-2  # below the first δ counts as 0
 UP, DOWN = 4.0, 3.0  # of δ after a step that was not taken, and between good steps
 STIFFEST = 1e8  # the δ at which a search is given up
-PACE_OVER = 10  # iterations over which the fall of E is judged
+PACE_OVER, PACE_BELOW = 10, 1e3  # iterations over which E's fall is judged; not if far off
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class InteriorPoint:
             return "iteration limit"
         if entry.seconds > self.settings.seconds:
             return "time limit"
-        if pace and len(trace) > 2 * PACE_OVER:
+        if pace and len(trace) > 2 * PACE_OVER and entry.optimality < PACE_BELOW:
             energies = [t.energy for t in trace]
             if min(energies[-PACE_OVER:]) > (1 - pace) * min(energies[:-PACE_OVER]):
                 return "slow"

@@ -33,7 +33,7 @@ class SolverSettings:
     """
 
     tolerance: float = 1e-6
-    iterations: int = 400
+    iterations: int = 500
     seconds: float = 900.0
     barrier: float = 1e-1
     barrier_shrink: float = 0.2
