@@ -230,7 +230,7 @@ def _project(
     tracking = _tracking(evaluator.basis.evaluate(controls)[0], CLOSENESS)
     evaluator = Evaluator(replace(problem, tracking=tracking))
     solver = InteriorPoint(evaluator, SolverSettings(barrier=1e-2))
-    return solver.solve(solver.start(controls))
+    return solver.solve(solver.start(controls, near=True))
 
 
 def cost_at(problem: SpacetimeProblem, controls: Array, coefficients: Array) -> Cost:
