@@ -9,6 +9,9 @@ is a least-squares problem. At first X_S is also pulled towards X_T (closeness �
 optimum is unique, easily found and nearly linear in θ. κ falls to 0 in stages, each starting from
 the last one's θ; only κ = 0 is NIO's own problem. G keeps θ from making X_T's torques small instead
 of optimal. Springs are gentler (gain 60/rad) until the last stage.
+
+Close to X_T the solver may follow an optimum that is not the lowest. So rounds follow: a solve
+that goes its own way from X_T; where it ends lower (a counterexample to θ), θ is moved on from it.
 """
 
 from __future__ import annotations
@@ -28,7 +31,9 @@ from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
 from motionstyle.nio.inner import Inner, InnerSettings, inner_solve, learning_row
 from motionstyle.nio.learning_problem import Cost, LearningProblem, target_cost
 from motionstyle.nio.style_space import StyleSpace
+from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.sensitivity import OptimumHessian
+from motionstyle.spacetime.solver_point import SolverSettings
 from motionstyle.spacetime.spacetime_problem import COUNT, Evaluator
 from motionstyle.spacetime.style import Style
 
@@ -59,6 +64,8 @@ class OurSettings:
         to move in one step.
     iterations, tolerance, barrier : of inner solves; a step whose solve ends above `usable` is
         refused.
+    damping : of the normal equations, relative. least_gain : of the objective, below which a stage
+        ends. rounds, round_steps : how often a counterexample is sought, and steps after each.
     """
 
     stages: Sequence[Stage]
@@ -74,6 +81,8 @@ class OurSettings:
     usable: float
     damping: float
     least_gain: float
+    rounds: int = 0
+    round_steps: int = 0
 
 
 @dataclass(frozen=True)
@@ -229,12 +238,33 @@ def learn(
         place = state.place
     if state is None:
         raise ValueError("the learner needs at least one stage")
+    last = replace(settings.stages[-1], steps=settings.round_steps)
+    for _ in range(settings.rounds):
+        lower = _counterexample(learner, state, last)
+        if lower is None:
+            break
+        record(lower, last, True)
+        state, trust = _stage(learner, lower, last, 1.0, record)
     about = dict(learning.start.about) | {
         "recipe": "ours",
         "solver_status": state.inner.result.status,
         "optimality": state.inner.result.optimality,
     }
     return Learnt(replace(state.style, about=about), rows)
+
+
+def _counterexample(learner: _Learner, state: _State, stage: Stage) -> _State | None:
+    """Return the state of a lower optimum at the same θ, if a solve from X_T finds one."""
+    free = solve_spacetime(
+        state.inner.problem,
+        learner.learning.controls,
+        settings=SolverSettings(tolerance=learner.settings.tolerance),
+    )
+    before = replace(state.inner, result=free)
+    found = learner.state(state.place, stage, None, before)
+    margin = NEGATIVE_GAP * state.inner.cost.total
+    lower = found.inner.cost.total < state.inner.cost.total - margin
+    return found if lower and learner.usable(found) else None
 
 
 def _stage(
