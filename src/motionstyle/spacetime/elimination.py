@@ -57,7 +57,7 @@ def eliminate(
     Parameters
     ----------
     hessian : over u, (F, 105, 105), becomes H − C A⁻¹ Cᵀ. inner : A over λ, (F, 32, 32), positive
-        definite. cross : C, u × λ, (F, 105, 32).
+        definite. cross : C, u × λ, (F, 105, 32); fastest if u runs along memory.
 
     Raises
     ------
@@ -70,11 +70,12 @@ def eliminate(
         if not len(at):
             lowers.append(np.zeros((0, 0)))
             continue
-        lower, info = dpotrf(inner[t][np.ix_(at, at)].T, lower=1, overwrite_a=1)
+        lower, info = dpotrf(inner[t, at[:, None], at].T, lower=1, overwrite_a=1)
         if info or not np.isfinite(lower[-1, -1]):
             raise FloatingPointError("the Newton matrix has entries that are not finite")
-        found = dtrsm(1.0, lower, cross[t][:, at].T, lower=1)
-        dgemm(-1.0, found, found, beta=1.0, c=hessian[t].T, trans_a=1, overwrite_c=1)
-        half[t, at] = found
+        # C L⁻ᵀ, in place: as BLAS sees it the rows that were picked are columns.
+        found = dtrsm(1.0, lower, cross[t].T[at].T, side=1, lower=1, trans_a=1, overwrite_b=1)
+        dgemm(-1.0, found, found, beta=1.0, c=hessian[t].T, trans_b=1, overwrite_c=1)
+        half[t, at] = found.T
         lowers.append(lower)
     return Eliminated(bearing_at, lowers, half)
