@@ -50,15 +50,15 @@ def assemble_hessian(basis: SplineBasis, hessians: Array) -> BandedHessian:
     """Return Σ_t Φ_tᵀ H_t Φ_t of symmetric H (F, 3n, 3n) over (q, q̇, q̈)."""
     frames, wide = hessians.shape[:2]
     n = wide // 3
-    split = np.empty((frames, 3, 3, n, n))
-    split[...] = hessians.reshape(frames, 3, n, 3, n).swapaxes(2, 3)
     pairs = np.ascontiguousarray(_pair_weights(basis))
-    local = pairs @ split.reshape(frames, 9, n * n)
+    split, local = np.empty((3, 3, n, n)), np.empty((10, n * n))
     # Of each control point with itself and the next three; all others follow by symmetry.
     blocks = np.zeros((basis.controls, 4, n * n))
-    for t, first in enumerate(basis.first):
+    for t, first in enumerate(basis.first):  # one at a time, to stay within the cache
+        split[...] = hessians[t].reshape(3, n, 3, n).swapaxes(1, 2)
+        np.matmul(pairs[t], split.reshape(9, n * n), out=local)
         for c in range(4):
-            blocks[first + c, : 4 - c] += local[t, _STARTS[c] : _STARTS[c + 1]]
+            blocks[first + c, : 4 - c] += local[_STARTS[c] : _STARTS[c + 1]]
     return BandedHessian(_laid_out(blocks.reshape(basis.controls, 4, n, n)), n)
 
 
