@@ -46,20 +46,40 @@ def solve(factor: Array, right: Array, columns: bool = False) -> Array:
     return found.reshape(right.shape)
 
 
+class BandAssembly:
+    """Adds up Σ_t Φ_tᵀ H_t Φ_t of symmetric H (3n, 3n) over (q, q̇, q̈), frame by frame.
+
+    One frame at a time stays within the processor's cache.
+    """
+
+    def __init__(self, basis: SplineBasis, size: int) -> None:
+        self.first, self.size = basis.first.tolist(), size
+        self._pairs = np.ascontiguousarray(_pair_weights(basis))
+        # Of each control point with itself and the next three; all others follow by symmetry.
+        self._blocks = np.zeros((basis.controls, 4, size * size))
+        self._split = np.empty((3, 3, size, size))
+        self._local = np.empty((10, size * size))
+
+    def add(self, frame: int, hessian: Array) -> None:
+        """Add a frame's Hessian (3n, 3n)."""
+        n, first, local = self.size, self.first[frame], self._local
+        self._split[...] = hessian.reshape(3, n, 3, n).swapaxes(1, 2)
+        np.matmul(self._pairs[frame], self._split.reshape(9, n * n), out=local)
+        for c in range(4):
+            self._blocks[first + c, : 4 - c] += local[_STARTS[c] : _STARTS[c + 1]]
+
+    def whole(self) -> BandedHessian:
+        """Return the sum."""
+        n = self.size
+        return BandedHessian(_laid_out(self._blocks.reshape(-1, 4, n, n)), n)
+
+
 def assemble_hessian(basis: SplineBasis, hessians: Array) -> BandedHessian:
     """Return Σ_t Φ_tᵀ H_t Φ_t of symmetric H (F, 3n, 3n) over (q, q̇, q̈)."""
-    frames, wide = hessians.shape[:2]
-    n = wide // 3
-    pairs = np.ascontiguousarray(_pair_weights(basis))
-    split, local = np.empty((3, 3, n, n)), np.empty((10, n * n))
-    # Of each control point with itself and the next three; all others follow by symmetry.
-    blocks = np.zeros((basis.controls, 4, n * n))
-    for t, first in enumerate(basis.first):  # one at a time, to stay within the cache
-        split[...] = hessians[t].reshape(3, n, 3, n).swapaxes(1, 2)
-        np.matmul(pairs[t], split.reshape(9, n * n), out=local)
-        for c in range(4):
-            blocks[first + c, : 4 - c] += local[_STARTS[c] : _STARTS[c + 1]]
-    return BandedHessian(_laid_out(blocks.reshape(basis.controls, 4, n, n)), n)
+    assembly = BandAssembly(basis, hessians.shape[1] // 3)
+    for t, hessian in enumerate(hessians):
+        assembly.add(t, hessian)
+    return assembly.whole()
 
 
 def _pair_weights(basis: SplineBasis) -> Array:

@@ -6,12 +6,13 @@ eliminates λ and finds the least δ that makes the matrix convex, `newton_step`
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.spacetime.banded import assemble_gradient, assemble_hessian, solve, spread
+from motionstyle.spacetime.banded import BandAssembly, assemble_gradient, solve, spread
 from motionstyle.spacetime.barrier_problem import BarrierProblem
 from motionstyle.spacetime.elimination import Eliminated, eliminate
 from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
@@ -134,25 +135,33 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     which the valleys of E are not narrow.
     """
     more = 1 + delta
-    if delta:
-        hessian = more * blocks.gauss
-        hessian += blocks.curved
-        _diagonal(hessian)[...] += delta * METRIC
-    else:
-        hessian = blocks.gauss + blocks.curved
     inner = more * blocks.inner_gauss
     _diagonal(inner)[...] += blocks.inner_diagonal + delta
     cross = more * blocks.mixed_gauss
     cross[:, :, :COUNT] += blocks.mixed_curved
-    eliminated = eliminate(hessian, inner, np.swapaxes(cross, 1, 2), system.bearing_at)
+    assembly = BandAssembly(system.evaluator.basis, COUNT)
+    eliminated = eliminate(
+        _hessians(blocks, delta), inner, np.swapaxes(cross, 1, 2), system.bearing_at, assembly.add
+    )
     fixed = np.where(system.fixed, RIGID, 0.0).ravel()
-    factor = assemble_hessian(system.evaluator.basis, hessian).factor(fixed + delta)
+    factor = assembly.whole().factor(fixed + delta)
     return None if factor is None else Factor(factor, eliminated, delta)
 
 
+def _hessians(blocks: Blocks, delta: float) -> Iterator[Array]:
+    """Yield each frame's Hessian over u at δ, (105, 105), always in the same memory."""
+    hessian = np.empty_like(blocks.gauss[0])
+    added, diagonal = delta * METRIC, _diagonal(hessian)
+    for gauss, curved in zip(blocks.gauss, blocks.curved, strict=True):
+        np.multiply(gauss, 1 + delta, out=hessian)
+        hessian += curved
+        diagonal += added
+        yield hessian
+
+
 def _diagonal(matrices: Array) -> Array:
-    """Return a view of the diagonals (F, n) of matrices (F, n, n)."""
-    return np.einsum("fii->fi", matrices)
+    """Return a view of the diagonals (..., n) of matrices (..., n, n)."""
+    return np.einsum("...ii->...i", matrices)
 
 
 def newton_step(
