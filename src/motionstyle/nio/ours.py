@@ -8,10 +8,11 @@ comes to X_T: an optimum's derivative by θ is known exactly (`spacetime.sensiti
 is a least-squares problem. At first X_S is also pulled towards X_T (closeness κ): close to X_T the
 optimum is unique, easily found and nearly linear in θ. κ falls to 0 in stages, each starting from
 the last one's θ; only κ = 0 is NIO's own problem. G keeps θ from making X_T's torques small instead
-of optimal. Springs are gentler (gain 60/rad) until the last stage.
+of optimal. Springs are gentler (gain 60/rad) in these stages.
 
-Close to X_T the solver may follow an optimum that is not the lowest. So rounds follow: a solve
-that goes its own way from X_T; where it ends lower (a counterexample to θ), θ is moved on from it.
+Close to X_T the solver may follow an optimum that is not the lowest. So rounds follow, on the
+problem itself: a solve from X_T goes its own way, and θ is moved on from where it ends, as long as
+such solves end lower than what was followed (counterexamples to θ).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from motionstyle.body.layout import JOINT_COORDINATES
+from motionstyle.dynamics.passive import SIGMOID_GAIN
 from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
 from motionstyle.nio.inner import Inner, InnerSettings, inner_solve, learning_row
 from motionstyle.nio.learning_problem import Cost, LearningProblem, target_cost
@@ -65,7 +67,7 @@ class OurSettings:
     iterations, tolerance, barrier : of inner solves; a step whose solve ends above `usable` is
         refused.
     damping : of the normal equations, relative. least_gain : of the objective, below which a stage
-        ends. rounds, round_steps : how often a counterexample is sought, and steps after each.
+        ends. rounds, round_steps : of solves from X_T that go their own way, and steps after each.
     """
 
     stages: Sequence[Stage]
@@ -238,13 +240,14 @@ def learn(
         place = state.place
     if state is None:
         raise ValueError("the learner needs at least one stage")
-    last = replace(settings.stages[-1], steps=settings.round_steps)
-    for _ in range(settings.rounds):
-        lower = _counterexample(learner, state, last)
-        if lower is None:
+    free = Stage(0.0, settings.round_steps, SIGMOID_GAIN)
+    for turn in range(settings.rounds):
+        found = _from_target(learner, state, free)
+        lower = found.inner.cost.total < (1 - NEGATIVE_GAP) * state.inner.cost.total
+        if turn > 0 and not lower:
             break
-        record(lower, last, True)
-        state, trust = _stage(learner, lower, last, 1.0, record)
+        record(found, free, True)
+        state, trust = _stage(learner, found, free, 1.0, record)
     about = dict(learning.start.about) | {
         "recipe": "ours",
         "solver_status": state.inner.result.status,
@@ -253,18 +256,14 @@ def learn(
     return Learnt(replace(state.style, about=about), rows)
 
 
-def _counterexample(learner: _Learner, state: _State, stage: Stage) -> _State | None:
-    """Return the state of a lower optimum at the same θ, if a solve from X_T finds one."""
-    free = solve_spacetime(
-        state.inner.problem,
-        learner.learning.controls,
-        settings=SolverSettings(tolerance=learner.settings.tolerance),
+def _from_target(learner: _Learner, state: _State, stage: Stage) -> _State:
+    """Return the state at the same θ whose X_S a solve from X_T finds by itself."""
+    learning = learner.learning
+    problem = learning.problem(state.style, gain=stage.gain)
+    solved = solve_spacetime(
+        problem, learning.controls, settings=SolverSettings(tolerance=learner.settings.tolerance)
     )
-    before = replace(state.inner, result=free)
-    found = learner.state(state.place, stage, None, before)
-    margin = NEGATIVE_GAP * state.inner.cost.total
-    lower = found.inner.cost.total < state.inner.cost.total - margin
-    return found if lower and learner.usable(found) else None
+    return learner.state(state.place, stage, None, replace(state.inner, result=solved))
 
 
 def _stage(

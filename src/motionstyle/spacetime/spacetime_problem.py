@@ -37,7 +37,10 @@ HEELS = tuple(i for i, name in enumerate(CONTACT_POINTS) if name.startswith("hee
 
 @dataclass(frozen=True)
 class SpacetimeSettings:
-    """Weights of the problem; see the module's text. Rows of inequalities are scaled by 1/unit."""
+    """Weights of the problem; see the module's text. Rows of inequalities are scaled by 1/unit.
+
+    sigmoid_gain : of γ in eq. (7), 1/rad. shoe_gain : of γ in eq. (9), 1/m.
+    """
 
     root_weight: float = 100.0
     foot_weight: float = 1e7
@@ -45,6 +48,7 @@ class SpacetimeSettings:
     range_weight: float = 1e6
     clearance_weight: float = 1e7
     sigmoid_gain: float = 500.0
+    shoe_gain: float = 500.0
     frames_per_knot: float = 2.0
 
 
@@ -260,7 +264,7 @@ class Evaluator:
         style, feet, gain = (
             self.problem.style,
             self.problem.feet,
-            self.problem.settings.sigmoid_gain,
+            self.problem.settings.shoe_gain,
         )
         height = ((points - feet.ground) * feet.normals).sum(axis=-1)
         squeeze = style.shoe_rest_length - height
