@@ -94,7 +94,7 @@ def newton_blocks(
         barrier=barrier,
         curved=bend,
         gauss=gauss,
-        mixed_curved=FORCE_UNIT * np.swapaxes(mixed[:, q], 1, 2),
+        mixed_curved=FORCE_UNIT * np.ascontiguousarray(np.swapaxes(mixed[:, q], 1, 2)),
         mixed_gauss=np.swapaxes(by_force, 1, 2) @ by_state,
         inner_gauss=np.swapaxes(by_force, 1, 2) @ by_force,
         inner_diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
