@@ -11,12 +11,16 @@ from snakemake.logging import logger
 import motionstyle
 from motionstyle.configuration import load_config
 from motionstyle.errors import MotionStyleError
+from motionstyle.evaluation.nio.kinds import KINDS
+from motionstyle.evaluation.nio.learners import LEARNERS
 from motionstyle.evaluation.spacetime.sensitivity import CHOICES as SENSITIVITY_CHOICES
 from motionstyle.jobs import check_writable, forget_killed_runs
 from motionstyle.mocap.datasets.doors import read_datasets
 from motionstyle.mocap.planted.variants import read_planted
 from motionstyle.mocap.datasets.sheet import EMBEDDED, MARKER_FILES, read_sheet
 from motionstyle.mocap.datasets.wheel import read_wheel_pin
+from motionstyle.nio.settings import our_settings, read_nio_settings
+from motionstyle.nio.styles_sheet import read_styles
 from motionstyle.spacetime.synthesis_sheet import read_syntheses
 from motionstyle.similarity.settings import read_settings
 from motionstyle.similarity.tasks import read_tasks
@@ -41,6 +45,9 @@ try:
     for key in PATH_KEYS:
         if isinstance(config.get(key), str):
             config[key] = str(located(config[key]))
+    for key in ("settings", "styles"):
+        if isinstance(config.get("nio"), dict) and isinstance(config["nio"].get(key), str):
+            config["nio"] = {**config["nio"], key: str(located(config["nio"][key]))}
     CONFIG = load_config(config, ROOT / "workflow/schemas/config.schema.json", Path.cwd())
     DATASETS = read_datasets(CONFIG["datasets"])
     if workflow.is_main_process:
@@ -70,6 +77,30 @@ try:
         for row in read_syntheses(CONFIG["syntheses"], None if SHIPPED else CLIPS)
         if all(id in CLIPS for id in (*row.clips, *row.others))
     }
+    # Styles are learnt from clips of the sheet; as with syntheses, rows of shipped sheets whose
+    # clips are not there are left out.
+    NIO = CONFIG["nio"]
+    NIO_SETTINGS = read_nio_settings(NIO["settings"], ROOT / "workflow/schemas/nio.schema.json")
+    our_settings(NIO_SETTINGS, NIO["schedule"])
+    SHIPPED_STYLES = Path(NIO["styles"]).resolve().parent == (ROOT / "config").resolve()
+    STYLES = {
+        row.id: row
+        for row in read_styles(NIO["styles"], None if SHIPPED_STYLES else CLIPS)
+        if row.clip in CLIPS
+    }
+    # Rows whose style is to be learnt need a row of the sheet of styles.
+    UNLEARNT = {
+        id: f"synthesis {id}: no row of {NIO['styles']} learns the style of {row.style_clip} by "
+        f"{row.recipe}; add one, or take style initial"
+        for id, row in SYNTHESES.items()
+        if row.recipe in ("ours", "paper")
+        and not any(
+            s.clip == row.style_clip and row.recipe in s.algorithms for s in STYLES.values()
+        )
+    }
+    if UNLEARNT and not SHIPPED:
+        raise MotionStyleError("\n".join(UNLEARNT.values()))
+    SYNTHESES = {id: row for id, row in SYNTHESES.items() if id not in UNLEARNT}
     SIMILARITY = read_settings(
         CONFIG["similarity"], ROOT / "workflow/schemas/similarity.schema.json"
     )
@@ -107,7 +138,8 @@ RAMPS = [
 if workflow.is_main_process:
     LEFT_OUT = [row.id for row in read_syntheses(CONFIG["syntheses"]) if row.id not in SYNTHESES]
     if LEFT_OUT:
-        logger.info(f"syntheses left out, clips not in {CONFIG['motions']}: {', '.join(LEFT_OUT)}")
+        missing = f"clips not in {CONFIG['motions']} or styles not learnt"
+        logger.info(f"syntheses left out, {missing}: {', '.join(LEFT_OUT)}")
 
 # Kept open while this run lasts: a run that was killed leaves locks, which the next one removes.
 ALIVE = forget_killed_runs(".snakemake") if workflow.is_main_process else None
@@ -129,6 +161,7 @@ PHYSICAL = [
     or id in PLATES
     or any(id in synthesis.clips for synthesis in SYNTHESES.values())
     or id == STUDY["clip"]
+    or any(id == style.clip for style in STYLES.values())
 ]
 
 # Motions that similar pairs are made of. Planted variants stand in for the embedded clips, whose
@@ -145,7 +178,22 @@ TASKS = TASKS if SIMILAR else {}
 ADAPTED = [f"{task}{variant}" for task in TASKS for variant in ("", "_without_style")]
 
 
+# Styles whose experiments go beyond learning and judging, and who is learnt and judged how.
+STUDIED = [STYLES[id] for id in NIO["studied"] if id in STYLES]
+LEARNT = [(row, name) for row in STYLES.values() for name in row.algorithms]
+LEARNT += [(row, name) for row in STUDIED for name in NIO["learners"] if name not in row.algorithms]
+JUDGED = [
+    (row, name)
+    for row in STYLES.values()
+    for name, kind in KINDS.items()
+    if (not kind.style or (row, kind.style) in LEARNT)
+    and (name in NIO["kinds"] or (row in STUDIED and kind.style in NIO["learners"]))
+]
+
+
 wildcard_constraints:
+    algorithm="|".join(LEARNERS),
+    kind="|".join(KINDS),
     task="|".join(TASKS) or "none",
     clip="|".join(CLIPS) or "none",
     planted="|".join(PLANTED) or "none",
@@ -287,6 +335,9 @@ SOLVER_TABLES += ["known_optima", "solver_growth"] if STUDY["clip"] in CLIPS els
 SOLVER_TABLES += ["spacetime_sensitivity"] if CHOICES else []
 TABLES += [RESULTS / f"tables/{name}.csv" for name in SOLVER_TABLES]
 
+NIO_TABLES = ["nio_learning", "resynthesis", "style_parameters", "figure_checks"] if STYLES else []
+TABLES += [RESULTS / f"tables/{name}.csv" for name in NIO_TABLES]
+
 SIMILARITY_TABLES = [
     *("similarity_alignments", "similarity_sets", "leg_subspaces", "leakage", "one_class_svm"),
     *("discrimination", "dose_response", "dose_points", "adaptations", "style_judgement"),
@@ -303,7 +354,7 @@ FIGURES = ["body", "strips", "gait", "markers", "marker_fit"]
 FIGURES += ["planted"] if PLANTED else []
 FIGURES += ["force_plates", "plate_moments"] if PLATES else []
 FIGURES += ["root_residual", "force_strips", "joint_moments"] if PHYSICAL else []
-# The tables and figures of style machines are added in their rules.
+# The tables and figures of style machines, and the figures of NIO, are added in their rules.
 FIGURES += ["syntheses", "warps"] if SYNTHESES else []
 FIGURES += ["solvers"] if COMPARED else []
 FIGURES += ["landscape"] if "base" in CHOICES else []

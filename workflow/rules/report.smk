@@ -156,6 +156,7 @@ rule publish:
                 ),
                 *SHMM_TABLES,
                 *SOLVER_TABLES,
+                *NIO_TABLES,
                 *(SIMILARITY_TABLES if SIMILAR else ()),
             )
         ],

@@ -95,6 +95,11 @@ def save_style(path: Path, style: Style) -> None:
     write_json(path, {"schema": SCHEMA_VERSION, "about": dict(style.about), "parameters": values})
 
 
+def save_no_style(path: Path, reason: str) -> None:
+    """Write, in place of a style, why there is none."""
+    write_json(path, {"schema": SCHEMA_VERSION, "failed": reason})
+
+
 def load_style(path: Path) -> Style:
     """Read a style and check it.
 
@@ -102,9 +107,11 @@ def load_style(path: Path) -> Style:
     ------
     MotionStyleError
         With the file's name and each parameter that is missing, unknown, in another unit, not a
-        number, or out of bounds.
+        number, or out of bounds; or why there is no style.
     """
     content = read_json(path)
+    if "failed" in content:
+        raise MotionStyleError(f"{path}: no style was learnt: {content['failed']}")
     if content.get("schema") != SCHEMA_VERSION:
         raise MotionStyleError(
             f"{path}: style schema {content.get('schema')!r}, expected {SCHEMA_VERSION}"

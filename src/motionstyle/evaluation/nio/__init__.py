@@ -1,0 +1,1 @@
+"""What learnt styles are measured by: tables, experiments and known truth of NIO (nio.md §7)."""

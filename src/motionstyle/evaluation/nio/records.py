@@ -1,0 +1,64 @@
+"""Records that jobs of learning leave: rows of tables, or why there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from motionstyle.dynamics.codegen import FrameFunction, load_functions
+from motionstyle.dynamics.functions import dynamics_functions
+from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.errors import MotionStyleError
+from motionstyle.evaluation.nio.kinds import KINDS
+from motionstyle.evaluation.nio.learning_table import style_cells
+from motionstyle.motion.storage import load_motion
+from motionstyle.nio.learning_problem import LearningProblem, learning_problem
+from motionstyle.nio.styles_sheet import StyleRow
+from motionstyle.tables import plain
+
+
+def load_functions_of(code: str | Path, second_order: str | Path) -> dict[str, FrameFunction]:
+    """Return the compiled functions that learning needs."""
+    functions = load_functions(dynamics_functions, Path(code))
+    return functions | load_functions(second_order_functions, Path(second_order))
+
+
+def load_learning(
+    row: StyleRow, motion: str | Path, functions: Mapping[str, FrameFunction]
+) -> LearningProblem:
+    """Return the learning problem of a row's window.
+
+    Raises
+    ------
+    MotionStyleError
+        If the window is not inside the motion, or see `learning_problem`.
+    """
+    return learning_problem(row.window(load_motion(motion)), functions)
+
+
+def learning_record(row: StyleRow, algorithm: str, work: Callable[[], Any]) -> dict[str, Any]:
+    """Return the record of one learning, whose `work` returns rows; a failure is one too."""
+    found: dict[str, Any] = {"cells": style_cells(row), "algorithm": algorithm}
+    try:
+        return {**found, "status": "done", "rows": [plain(one) for one in work()]}
+    except (MotionStyleError, FloatingPointError) as error:
+        print(f"failed: {error}")
+        return {**found, "status": "failed", "reason": str(error), "rows": []}
+
+
+def judging_record(row: StyleRow, name: str, learning: LearningProblem | None) -> dict[str, Any]:
+    """Return the head of a record of judging: whose style, of which kind, how X_T was projected."""
+    kind = KINDS[name]
+    found: dict[str, Any] = {
+        "cells": style_cells(row),
+        "kind": name,
+        **{k: getattr(kind, k) for k in ("algorithm", "variant", "ends")},
+    }
+    if learning is not None:
+        found["projection"] = {
+            "projection_status": learning.projection.status,
+            "projection_angle_rms_deg": learning.projection.angle_rms_deg,
+            "projection_root_n": learning.projection.root_n,
+        }
+    return found

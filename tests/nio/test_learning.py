@@ -1,0 +1,208 @@
+"""Learning styles: derivatives against differences, G against its definition, twins, bad input."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motionstyle.errors import MotionStyleError
+from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
+from motionstyle.nio.inner import InnerSettings, inner_solve
+from motionstyle.nio.learning_problem import (
+    ROOT_LIMIT_N,
+    cost_at,
+    learning_problem,
+    target_cost,
+)
+from motionstyle.nio.paper import PaperSettings, learn_as_paper
+from motionstyle.nio.preferences import PreferenceSettings, learn_preferences, lowest, plane
+from motionstyle.spacetime.solver_point import FORCE_UNIT
+from motionstyle.spacetime.spacetime_problem import Evaluator
+
+GAIN = 60.0
+# One of each kind of parameter: α, k_s1, k_s2, k_d, q̄ of some joints, and both of the shoe.
+CHOSEN = (3, 29 + 3, 58 + 10, 87 + 4, 116 + 3, 116 + 9, 145, 146)
+
+
+def quiet(_text):
+    pass
+
+
+@pytest.fixture(scope="module")
+def style(made_learning):
+    """Springs everywhere, so that every derivative is of something."""
+    rng = np.random.default_rng(1)
+    vector = made_learning.start.vector()
+    vector[:29] = rng.dirichlet(np.full(29, 5.0))
+    vector[29:87] = rng.uniform(20, 60, 58)
+    vector[87:116] = rng.uniform(1, 4, 29)
+    vector[116:145] += rng.normal(0, 0.05, 29)
+    return made_learning.start.with_vector(vector)
+
+
+@pytest.fixture(scope="module")
+def solved(made_learning, style):
+    found = inner_solve(made_learning, style, InnerSettings(0.0, GAIN, 200, 1e-8, 1e-3))
+    assert found.result.status == "converged"
+    return found
+
+
+def moved(style, k, by):
+    vector = style.vector()
+    vector[k] += by
+    return style.with_vector(vector)
+
+
+def step_of(style, k):
+    return 1e-5 if k >= 116 and k != 145 else 1e-5 * max(1.0, abs(style.vector()[k]))
+
+
+def test_the_projected_motion_obeys_newton_and_g_is_not_negative(made_learning, style, solved):
+    values = target_cost(made_learning, style, GAIN).values
+    assert np.abs(values.root).max() < ROOT_LIMIT_N
+    gap = target_cost(made_learning, style, GAIN).total - solved.cost.total
+    assert gap >= 0
+    for sample in (made_learning.start, style):
+        near = inner_solve(made_learning, sample, InnerSettings(0.0, GAIN, 200, 1e-6, 1e-3))
+        assert target_cost(made_learning, sample, GAIN).total >= near.cost.total
+
+
+def test_e_by_theta_is_what_differences_of_e_are(made_learning, style, solved):
+    problem = made_learning.problem(style, gain=GAIN)
+    controls = solved.result.point.controls + 1e-3
+    forces = solved.result.point.coefficients * FORCE_UNIT
+    exact = energy_by_style(problem, cost_at(problem, controls, forces).values)
+    for k in CHOSEN:
+        h = step_of(style, k)
+        up, down = (
+            cost_at(replace(problem, style=moved(style, k, s * h)), controls, forces).energy
+            for s in (1, -1)
+        )
+        assert exact[k] == pytest.approx((up - down) / (2 * h), rel=1e-4, abs=1e-6 * exact.max())
+
+
+def test_mixed_derivatives_are_differences_of_the_gradient(made_learning, style, solved):
+    problem = made_learning.problem(style, gain=GAIN)
+    controls = solved.result.point.controls
+    forces = solved.result.point.coefficients * FORCE_UNIT
+    by_state, by_force = mixed_derivatives(
+        problem, cost_at(problem, controls, forces).values, forces
+    )
+    for k in CHOSEN:
+        h = step_of(style, k)
+        ends = []
+        for s in (1, -1):
+            evaluator = Evaluator(replace(problem, style=moved(style, k, s * h)))
+            values = evaluator.values(controls, forces)
+            slopes = evaluator.slopes(values)
+            ends.append(
+                [
+                    2 * np.einsum("frx,fr->fx", part, values.residuals)
+                    for part in (slopes.by_state, slopes.by_coefficients)
+                ]
+            )
+        for exact, up, down in zip((by_state, by_force), *ends, strict=True):
+            difference = (up - down) / (2 * h)
+            scale = max(np.abs(difference).max(), 1e-9)
+            assert np.abs(exact[..., k] - difference).max() < 1e-3 * scale
+
+
+def test_g_by_theta_is_exact_at_an_optimum(made_learning, style, solved):
+    """The envelope theorem, eq. (21), against differences of converged solves."""
+    target = target_cost(made_learning, style, GAIN)
+    exact = energy_by_style(solved.problem, target.values)
+    exact = exact - energy_by_style(solved.problem, solved.cost.values)
+    settings = InnerSettings(0.0, GAIN, 200, 1e-9, 1e-3)
+    # Multiplied by usual sizes, parameters are alike.
+    for k, unit in ((3, 1 / 29), (29 + 3, 50.0), (116 + 3, 0.2)):
+        gaps = []
+        for sign in (1, -1):
+            near = moved(style, k, sign * 1e-3 * unit)
+            found = inner_solve(made_learning, near, settings, None, solved.result.point)
+            gaps.append(target_cost(made_learning, near, GAIN).total - found.cost.total)
+        difference = (gaps[0] - gaps[1]) / 2e-3
+        assert unit * exact[k] == pytest.approx(difference, rel=0.03, abs=0.02 * target.total)
+
+
+def test_at_an_exact_solution_g_and_its_gradient_vanish(made_learning, style, solved):
+    """X* made with θ* is optimal for θ*, and for no other."""
+    twin = replace(
+        made_learning,
+        controls=solved.result.point.controls,
+        coordinates=solved.cost.values.coordinates,
+    )
+    target = target_cost(twin, style, GAIN)
+    again = inner_solve(twin, style, InnerSettings(0.0, GAIN, 200, 1e-8, 1e-3))
+    assert abs(target.total - again.cost.total) < 1e-4 * target.total
+    unit = np.concatenate([np.repeat((1 / 29, 50, 50, 3, 0.2), 29), (1e3, 5e-4)])
+    slope = energy_by_style(solved.problem, target.values)
+    slope -= energy_by_style(solved.problem, again.cost.values)
+    assert np.abs(unit * slope).max() < 1e-2 * target.total
+    other = inner_solve(twin, made_learning.start, InnerSettings(0.0, GAIN, 200, 1e-6, 1e-3))
+    assert target_cost(twin, made_learning.start, GAIN).total > 1.05 * other.cost.total
+
+
+def test_the_papers_objective_never_rises(made_learning):
+    settings = PaperSettings(iterations=3, inner_iterations=25)
+    found = learn_as_paper(made_learning, settings, quiet)
+    objectives = [row["objective"] for row in found.rows]
+    assert len(objectives) >= 2
+    assert all(b <= a for a, b in zip(objectives, objectives[1:], strict=False))
+    assert found.style.vector().shape == (SIZE,)
+
+
+def test_planes_bound_g_from_below(made_learning):
+    """G is convex in α, so that every X_S bounds it at any other α (nio.md E3)."""
+    settings = InnerSettings(0.0, GAIN, 200, 1e-7, 1e-2)
+    empty = np.zeros(SIZE)
+    styles = []
+    for shares in (np.full(29, 1 / 29), np.random.default_rng(3).dirichlet(np.full(29, 8.0))):
+        vector = empty.copy()
+        vector[:29] = shares
+        styles.append(made_learning.start.with_vector(vector))
+    solves = [inner_solve(made_learning, s, settings) for s in styles]
+    targets = [target_cost(made_learning, s, GAIN) for s in styles]
+    slope, offset = plane(targets[0], solves[0].cost)
+    here = targets[0].total - solves[0].cost.total
+    assert slope @ styles[0].preferences + offset == pytest.approx(here, rel=1e-9)
+    there = targets[1].total - solves[1].cost.total
+    assert slope @ styles[1].preferences + offset <= there + 0.02 * targets[1].total
+
+
+def test_the_next_preferences_are_least_in_the_highest_plane():
+    rng = np.random.default_rng(0)
+    planes = [(rng.normal(size=29), float(rng.normal())) for _ in range(4)]
+    best = np.full(29, 1 / 29)
+    found = lowest(planes, best, 1e-6, (0.1, 10.0))
+    assert found.sum() == pytest.approx(1)
+
+    def height(alpha):
+        return max(slope @ alpha + offset for slope, offset in planes)
+
+    for _ in range(300):
+        other = np.clip(29 * rng.dirichlet(np.full(29, rng.uniform(0.1, 3))), 0.1, 10)
+        assert height(found) <= height(other / other.sum()) + 0.02
+
+
+def test_preferences_alone_lower_g(made_learning):
+    found = learn_preferences(made_learning, PreferenceSettings(rounds=3), quiet)
+    accepted = [row["objective"] for row in found.rows if row["accepted"]]
+    assert accepted[-1] == min(row["objective"] for row in found.rows)
+    assert not found.style.vector()[29:].any()
+    assert found.style.preferences.sum() == pytest.approx(1)
+
+
+def test_a_motion_without_forces_teaches_no_style(made_walk, all_functions):
+    with pytest.raises(MotionStyleError, match="no contact forces"):
+        learning_problem(replace(made_walk, contact_forces=None), all_functions)
+
+
+def test_a_window_without_its_contacts_is_refused(made_walk, all_functions):
+    """Nothing holds the body up, yet it does not fall."""
+    afloat = replace(
+        made_walk,
+        contacts=np.zeros_like(made_walk.contacts),
+        contact_forces=np.zeros_like(made_walk.contact_forces),
+    )
+    with pytest.raises(MotionStyleError, match="choose a window without wrong contacts"):
+        learning_problem(afloat, all_functions)
