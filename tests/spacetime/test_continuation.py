@@ -35,7 +35,7 @@ def result(problem, start, told):
 
 def test_the_last_stage_is_the_problem_itself(result, problem, told):
     stages = [line for line in told if line.startswith("sigmoid gain")]
-    ways = ((20, 1), (60, 10), (200, 100), (500, 100))
+    ways = ((20, 1), (100, 1), (500, 100))
     assert stages == [f"sigmoid gain {g}/rad, root weight {w}" for g, w in ways]
     assert result.status == "converged"
     evaluator = Evaluator(problem)
@@ -54,8 +54,8 @@ def test_iterations_and_seconds_are_those_of_all_stages(result, told):
     assert sorted(seconds) == seconds
     assert result.seconds >= seconds[-1] > 0
     starts = sum(entry.step == 0 and entry.regularisation == 0 for entry in result.trace)
-    assert starts >= 4
-    assert result.iterations == len(lines) - 4  # each stage records its start too
+    assert starts >= 3
+    assert result.iterations == len(lines) - 3  # each stage records its start too
 
 
 def test_a_warm_start_goes_straight_to_the_own_gain(result, problem):

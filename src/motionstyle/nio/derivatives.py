@@ -73,7 +73,7 @@ def energy_by_style(problem: SpacetimeProblem, values: Values) -> Array:
 def _energy_by_shoes(evaluator: Evaluator, values: Values) -> Array:
     """Return ∂E/∂(k_shoe, h̄): eq. (9)'s force along each heel's normal, by virtual work."""
     problem = evaluator.problem
-    gain, style, feet = problem.settings.sigmoid_gain, problem.style, problem.feet
+    gain, style, feet = problem.settings.shoe_gain, problem.style, problem.feet
     slopes = evaluator.slopes(values)
     by_force = slopes.by_force.reshape(problem.frames, COUNT, POINTS, 3)
     by_push = np.einsum("frpa,fpa->frp", by_force, feet.normals)[:, :, HEELS]

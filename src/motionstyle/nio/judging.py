@@ -55,7 +55,9 @@ def judge(
 
     Parameters
     ----------
-    starts : `target`, or `perturbed_N` (X_T with smooth noise of 10° rms, seed N).
+    starts : `target` (from X_T, the problem itself at once), `gentle` (from X_T by way of gentler
+        problems, which lead further away), or `perturbed_N` (so too, from X_T with smooth noise of
+        10° rms, seed N).
     keep_ends : control points at both ends that stay X_T's. root_weight : w_r where it is another.
     """
     problem = replace(learning.problem(style), keep_ends=keep_ends)
@@ -66,7 +68,7 @@ def judge(
     rows, results = [], []
     for name in starts:
         controls = _start(learning, problem, name, keep_ends)
-        result = solve_spacetime(problem, controls, settings=settings)
+        result = solve_spacetime(problem, controls, settings=settings, warm=name == "target")
         row = {"start": name, **_measured(learning, problem, result, target.energy, target.total)}
         rows.append(row)
         results.append(result)
@@ -90,7 +92,7 @@ def judge(
 
 
 def _start(learning: LearningProblem, problem: SpacetimeProblem, name: str, keep: int) -> Array:
-    if name == "target":
+    if name in ("target", "gentle"):
         return learning.controls
     moved = perturbed(learning.target, int(name.removeprefix("perturbed_")))
     controls = problem.basis().fit(moved.coordinates)

@@ -21,11 +21,11 @@ from motionstyle.dynamics.passive import PassiveParameters
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import resample
-from motionstyle.spacetime.barrier_problem import BarrierProblem
 from motionstyle.spacetime.edits import Edits, edit_ranges
 from motionstyle.spacetime.foot_constraints import FootConstraints
 from motionstyle.spacetime.footprint_constraints import captured_constraints
 from motionstyle.spacetime.interior_point import InteriorPoint
+from motionstyle.spacetime.objective import best_coefficients, objective_terms
 from motionstyle.spacetime.solver_point import (
     FORCE_UNIT,
     InteriorPointResult,
@@ -40,7 +40,6 @@ from motionstyle.spacetime.spacetime_problem import (
     Tracking,
     Values,
 )
-from motionstyle.spacetime.starting_point import starting_point
 from motionstyle.spacetime.style import JOINTS_29, Style, initial_style
 from motionstyle.spacetime.synthesis import USUAL_SHOES
 
@@ -49,7 +48,6 @@ Array = NDArray[np.float64]
 RATE_HZ = 30.0  # of the paper
 PLACE_BY_ANGLE = 30.0  # weight of 1 m² of the root against 1 rad²: 1 cm counts as 3°
 CLOSENESS = 3e4  # of the projection: 1 rad² against (1 N·m)² of the mean joint torque
-TARGET_BARRIER = 1e-6
 ROOT_LIMIT_N = 1.0  # root residual that a projected motion may keep, N and N·m
 
 
@@ -196,7 +194,7 @@ def learning_problem(
         target=target,
         controls=found.point.controls,
         coordinates=values.coordinates,
-        feet=feet,
+        feet=captured_constraints(target, "path"),  # which X_T now keeps to the last
         ranges=ranges,
         start=replace(style, about=about),
         projection=projection,
@@ -232,7 +230,7 @@ def _project(
     tracking = _tracking(evaluator.basis.evaluate(controls)[0], CLOSENESS)
     evaluator = Evaluator(replace(problem, tracking=tracking))
     solver = InteriorPoint(evaluator, SolverSettings(barrier=1e-2))
-    return solver.solve(solver.start(controls))
+    return solver.solve(solver.start(controls, near=True))
 
 
 def cost_at(problem: SpacetimeProblem, controls: Array, coefficients: Array) -> Cost:
@@ -243,14 +241,9 @@ def cost_at(problem: SpacetimeProblem, controls: Array, coefficients: Array) -> 
     """
     evaluator = Evaluator(problem)
     values = evaluator.values(controls, coefficients)
-    settings = problem.settings
-    squares = values.residuals**2
-    muscle, root = float(squares[:, 6:].sum()), float(squares[:, :6].sum())
-    short = np.where(evaluator.row_active, np.minimum(values.inequalities, 0.0), 0.0)
-    total = muscle + root + float((values.foot_residuals**2).sum())
-    total += settings.force_weight * float((coefficients[evaluator.bearing] ** 2).sum())
-    total += float((evaluator.row_weight * short**2).sum())
-    return Cost(total, muscle + root, muscle, root, values)
+    terms = objective_terms(evaluator, values, coefficients)
+    muscle, root = terms["muscles"], terms["root"]
+    return Cost(sum(terms.values()), muscle + root, muscle, root, values)
 
 
 def cost_of_point(problem: SpacetimeProblem, point: Point) -> Cost:
@@ -263,9 +256,7 @@ def motion_cost(problem: SpacetimeProblem, controls: Array) -> Cost:
 
     λ of a given motion is a nuisance: found anew at every θ, G ≥ 0 and the envelope gradient hold.
     """
-    system = BarrierProblem(Evaluator(problem))
-    point = starting_point(system, controls, None, TARGET_BARRIER)
-    return cost_of_point(problem, point)
+    return cost_at(problem, controls, best_coefficients(Evaluator(problem), controls))
 
 
 def target_cost(learning: LearningProblem, style: Style, gain: float | None = None) -> Cost:

@@ -8,7 +8,11 @@ comes to X_T: an optimum's derivative by θ is known exactly (`spacetime.sensiti
 is a least-squares problem. At first X_S is also pulled towards X_T (closeness κ): close to X_T the
 optimum is unique, easily found and nearly linear in θ. κ falls to 0 in stages, each starting from
 the last one's θ; only κ = 0 is NIO's own problem. G keeps θ from making X_T's torques small instead
-of optimal. Springs are gentler (gain 60/rad) until the last stage.
+of optimal. Springs are gentler (gain 60/rad) in these stages.
+
+Close to X_T the solver may follow an optimum that is not the lowest. So rounds follow, on the
+problem itself: a solve from X_T goes its own way, and θ is moved on from where it ends, as long as
+such solves end lower than what was followed (counterexamples to θ).
 """
 
 from __future__ import annotations
@@ -24,16 +28,20 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from motionstyle.body.layout import JOINT_COORDINATES
+from motionstyle.dynamics.passive import SIGMOID_GAIN
 from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
 from motionstyle.nio.inner import Inner, InnerSettings, inner_solve, learning_row
 from motionstyle.nio.learning_problem import Cost, LearningProblem, target_cost
 from motionstyle.nio.style_space import StyleSpace
+from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.sensitivity import OptimumHessian
+from motionstyle.spacetime.solver_point import SolverSettings
 from motionstyle.spacetime.spacetime_problem import COUNT, Evaluator
 from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
+MOST_REFUSALS = 4  # in a row, then a stage ends
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
@@ -58,6 +66,8 @@ class OurSettings:
         to move in one step.
     iterations, tolerance, barrier : of inner solves; a step whose solve ends above `usable` is
         refused.
+    damping : of the normal equations, relative. least_gain : of the objective, below which a stage
+        ends. rounds, round_steps : of solves from X_T that go their own way, and steps after each.
     """
 
     stages: Sequence[Stage]
@@ -73,6 +83,8 @@ class OurSettings:
     usable: float
     damping: float
     least_gain: float
+    rounds: int = 0
+    round_steps: int = 0
 
 
 @dataclass(frozen=True)
@@ -203,7 +215,7 @@ def learn(
     began = perf_counter()
     rows: list[dict[str, Any]] = []
     state: _State | None = None
-    place = learner.origin
+    place, trust = learner.origin, 1.0
 
     def record(found: _State, stage: Stage, accepted: bool) -> None:
         row = learning_row(learning, found.style, found.target, found.inner)
@@ -224,10 +236,18 @@ def learn(
             # From a neighbour it failed: X_T itself is the safest start there is.
             state = learner.state(place, stage, learning.controls, None)
         record(state, stage, True)
-        state = _stage(learner, state, stage, record)
+        state, trust = _stage(learner, state, stage, trust, record)
         place = state.place
     if state is None:
         raise ValueError("the learner needs at least one stage")
+    free = Stage(0.0, settings.round_steps, SIGMOID_GAIN)
+    for turn in range(settings.rounds):
+        found = _from_target(learner, state, free)
+        lower = found.inner.cost.total < (1 - NEGATIVE_GAP) * state.inner.cost.total
+        if turn > 0 and not lower:
+            break
+        record(found, free, True)
+        state, trust = _stage(learner, found, free, 1.0, record)
     about = dict(learning.start.about) | {
         "recipe": "ours",
         "solver_status": state.inner.result.status,
@@ -236,14 +256,24 @@ def learn(
     return Learnt(replace(state.style, about=about), rows)
 
 
+def _from_target(learner: _Learner, state: _State, stage: Stage) -> _State:
+    """Return the state at the same θ whose X_S a solve from X_T finds by itself."""
+    learning = learner.learning
+    problem = learning.problem(state.style, gain=stage.gain)
+    solved = solve_spacetime(
+        problem, learning.controls, settings=SolverSettings(tolerance=learner.settings.tolerance)
+    )
+    return learner.state(state.place, stage, None, replace(state.inner, result=solved))
+
+
 def _stage(
     learner: _Learner,
     state: _State,
     stage: Stage,
+    trust: float,
     record: Callable[[_State, Stage, bool], None],
-) -> _State:
-    """Return the best state of one stage."""
-    trust = 1.0
+) -> tuple[_State, float]:
+    """Return the best state of one stage, and the trust to go on with."""
     jacobian, controls = learner.linearised(state)
     refused = 0
     for _ in range(stage.steps):
@@ -254,7 +284,7 @@ def _stage(
         record(found, stage, better)
         if not better:
             trust, refused = 0.3 * trust, refused + 1
-            if refused == 3:
+            if refused == MOST_REFUSALS:
                 break
             continue
         gained = 1 - found.objective / state.objective
@@ -262,4 +292,4 @@ def _stage(
         if gained < learner.settings.least_gain:
             break
         jacobian, controls = learner.linearised(state)
-    return state
+    return state, min(1.0, 2 * trust)

@@ -72,8 +72,8 @@ class BarrierProblem:
 
     def pull(self, slopes: Slopes, lift: Array, foot_lift: Array, rows: Array) -> Array:
         """Return Jᵀy summed over all rows, by u, (F, 105)."""
-        gradient = np.einsum("fru,fr->fu", slopes.by_state, lift)
-        gradient[:, :COUNT] += np.einsum("fru,fr->fu", slopes.feet, foot_lift)
+        gradient = np.vecmat(lift, slopes.by_state)
+        gradient[:, :COUNT] += np.vecmat(foot_lift, slopes.feet)
         gradient[:, :COUNT] -= self.row_pull(slopes, rows)
         return gradient
 
@@ -82,7 +82,7 @@ class BarrierProblem:
         evaluator = self.evaluator
         n = len(evaluator.limited)
         scaled = rows * evaluator.row_scale
-        pull = np.einsum("fpq,fp->fq", slopes.heights, scaled[:, 2 * n :])
+        pull = np.vecmat(scaled[:, 2 * n :], slopes.heights)
         pull[:, evaluator.limited] += scaled[:, :n] - scaled[:, n : 2 * n]
         return pull
 
@@ -92,7 +92,7 @@ class BarrierProblem:
         gradient[:, :COUNT] += self.evaluator.tracking_pull(values.coordinates)
         by_controls = assemble_gradient(self.evaluator.basis, gradient)
         by_controls[self.fixed] = 0.0
-        by_force = FORCE_UNIT * np.einsum("fru,fr->fu", slopes.by_coefficients, point.multiplier)
+        by_force = FORCE_UNIT * np.vecmat(point.multiplier, slopes.by_coefficients)
         by_force += self.force_weight * point.coefficients - point.dual
         by_elastic = (self.weight * point.elastic - point.row_dual)[self.active]
         duals = np.concatenate([point.dual[self.bearing], point.row_dual[self.active]])

@@ -1,9 +1,9 @@
 """Solve a spacetime problem by way of gentler ones: softer springs, and a root that may give.
 
 The springs' sigmoid (7) of gain 500/rad puts a kink at every rest angle, and the root's weight
-makes the valleys of E narrow; Newton's method stumbles over both. Stages with gains of 20, 60 and
-200 and hundredths of the weight come first, each from where the last one ended, multipliers and
-all, and not solved to the end; only the last, the problem itself, decides the status.
+makes the valleys of E narrow; Newton's method stumbles over both. Stages with gains of 20 and 100
+and a hundredth of the weight come first, each from where the last one ended, multipliers and all,
+and not solved to the end; only the last, the problem itself, decides the status.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Stage:
     """A gentler problem on the way.
 
     gain : of the springs' sigmoid, 1/rad. root_share : of the root's own weight. barrier : μ to
-    begin with. tolerance, iterations : where it ends. whole_steps : see `SolverSettings`.
+    begin with. tolerance, iterations : where it ends. pace, whole_steps : see `SolverSettings`.
     """
 
     gain: float
@@ -40,15 +40,15 @@ class Stage:
     barrier: float
     tolerance: float
     iterations: int
+    pace: float = 0.0
     whole_steps: bool = False
 
 
 STAGES = (
-    Stage(20.0, 0.01, 1e-1, 0.2, 50, whole_steps=True),
-    Stage(60.0, 0.1, 1e-2, 0.1, 30),
-    Stage(200.0, 1.0, 1e-3, 0.1, 30),
+    Stage(20.0, 0.01, 1e-1, 0.1, 120, pace=0.1, whole_steps=True),
+    Stage(100.0, 0.01, 1e-3, 0.05, 80, pace=0.02),
 )
-LAST_BARRIER = 1e-4
+LAST_BARRIER = 1e-3
 
 
 def solve_spacetime(
@@ -93,6 +93,7 @@ def solve_spacetime(
                 tolerance=max(settings.tolerance, stage.tolerance),
                 iterations=min(settings.iterations, stage.iterations),
                 barrier=stage.barrier,
+                pace=stage.pace,
                 whole_steps=stage.whole_steps,
                 seconds=max(0.0, settings.seconds - seconds),
             ),

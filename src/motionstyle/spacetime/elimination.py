@@ -8,7 +8,7 @@ wrong by percents along the valleys, and convergence near an optimum linear.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,14 +50,21 @@ class Eliminated:
 
 
 def eliminate(
-    hessian: Array, inner: Array, cross: Array, bearing_at: Sequence[NDArray[np.int64]]
+    hessians: Iterable[Array],
+    inner: Array,
+    cross: Array,
+    bearing_at: Sequence[NDArray[np.int64]],
+    left: Callable[[int, Array], None] | None = None,
 ) -> Eliminated:
     """Take λ out of a Hessian, in place, and return how.
 
     Parameters
     ----------
-    hessian : over u, (F, 105, 105), becomes H − C A⁻¹ Cᵀ. inner : A over λ, (F, 32, 32), positive
-        definite. cross : C, u × λ, (F, 105, 32).
+    hessians : over u, F of (105, 105); each becomes H − C A⁻¹ Cᵀ, in place. An array, or made one
+        by one in the same memory.
+    inner : A over λ, (F, 32, 32), positive definite. cross : C, u × λ, (F, 105, 32); fastest if u
+        runs along memory.
+    left : told each frame and what its Hessian became, before the next is made.
 
     Raises
     ------
@@ -66,15 +73,24 @@ def eliminate(
     """
     half = np.zeros((len(cross), cross.shape[2], cross.shape[1]))
     lowers = []
-    for t, at in enumerate(bearing_at):
-        if not len(at):
-            lowers.append(np.zeros((0, 0)))
-            continue
-        lower, info = dpotrf(inner[t][np.ix_(at, at)].T, lower=1, overwrite_a=1)
-        if info:
-            raise FloatingPointError("the Newton matrix has entries that are not finite")
-        found = dtrsm(1.0, lower, cross[t][:, at].T, lower=1)
-        dgemm(-1.0, found, found, beta=1.0, c=hessian[t].T, trans_a=1, overwrite_c=1)
-        half[t, at] = found
-        lowers.append(lower)
+    for t, (at, hessian) in enumerate(zip(bearing_at, hessians, strict=True)):
+        lowers.append(_eliminate_frame(hessian, inner[t], cross[t], at, half[t]))
+        if left:
+            left(t, hessian)
     return Eliminated(bearing_at, lowers, half)
+
+
+def _eliminate_frame(
+    hessian: Array, inner: Array, cross: Array, at: NDArray[np.int64], half: Array
+) -> Array:
+    """Take one frame's λ out of its Hessian, fill in L⁻¹Cᵀ (32, 105), and return L."""
+    if not len(at):
+        return np.zeros((0, 0))
+    lower, info = dpotrf(inner[at[:, None], at].T, lower=1, overwrite_a=1)
+    if info or not np.isfinite(lower[-1, -1]):
+        raise FloatingPointError("the Newton matrix has entries that are not finite")
+    # C L⁻ᵀ, in place: as BLAS sees it the rows that were picked are columns.
+    found = dtrsm(1.0, lower, cross.T[at].T, side=1, lower=1, trans_a=1, overwrite_b=1)
+    dgemm(-1.0, found, found, beta=1.0, c=hessian.T, trans_b=1, overwrite_c=1)
+    half[at] = found.T
+    return lower

@@ -45,6 +45,7 @@ MOST_NONLINEAR = 10.0  # a step that errs by more than ten times its gain is not
 LEAST_DELTA, FIRST_DELTA = 1e-4, 1e-2  # below the first δ counts as 0
 UP, DOWN = 4.0, 3.0  # of δ after a step that was not taken, and between good steps
 STIFFEST = 1e8  # the δ at which a search is given up
+PACE_OVER, PACE_BELOW = 10, 1e3  # iterations over which E's fall is judged; not if far off
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ class InteriorPoint:
             )  # fmt: skip
             if log:
                 log(str(trace[-1]))
-            status = self._verdict(trace[-1])
+            status = self._verdict(trace)
             if status:
                 break
             lower = self._lowered(barrier, point, values, slopes)
@@ -179,8 +180,9 @@ class InteriorPoint:
     def _values(self, point: Point) -> Values:
         return self.evaluator.values(point.controls, point.coefficients * FORCE_UNIT)
 
-    def _verdict(self, entry: Trace) -> str | None:
+    def _verdict(self, trace: list[Trace]) -> str | None:
         """Return the status to end with, or None to go on."""
+        entry, pace = trace[-1], self.settings.pace
         if not np.isfinite([entry.objective, entry.energy, entry.optimality]).all():
             return "not a number"
         if entry.optimality <= self.settings.tolerance:
@@ -189,6 +191,10 @@ class InteriorPoint:
             return "iteration limit"
         if entry.seconds > self.settings.seconds:
             return "time limit"
+        if pace and len(trace) > 2 * PACE_OVER and entry.optimality < PACE_BELOW:
+            energies = [t.energy for t in trace]
+            if min(energies[-PACE_OVER:]) > (1 - pace) * min(energies[:-PACE_OVER]):
+                return "slow"
         return None
 
     def _lowered(self, barrier: float, point: Point, values: Values, slopes: Slopes) -> float:
@@ -271,7 +277,7 @@ class InteriorPoint:
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
             moved, found, length = self._moved(here, step)
-        if not np.isfinite(found.energy):
+        if not np.isfinite(found.residuals).all() or np.abs(found.residuals).max() > 1e100:
             return None
         before = self.system.error(here.point, values, slopes, here.barrier)
         after = self.system.error(moved, found, self.evaluator.slopes(found), here.barrier)

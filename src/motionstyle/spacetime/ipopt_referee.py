@@ -113,7 +113,7 @@ class IpoptReferee:
             force = cone[:, 4 * k : 4 * k + 4] @ v[N_U + 4 * k : N_U + 4 * k + 4] * FORCE_UNIT
             if k in HEELS and style.shoe_stiffness > 0:
                 squeeze = style.shoe_rest_length - heights[k]
-                on = 0.5 * (ca.tanh(gain * squeeze) + 1)
+                on = 0.5 * (ca.tanh(problem.settings.shoe_gain * squeeze) + 1)
                 force += on * style.shoe_stiffness * squeeze * normals[:, k]
             pushes.append(force)
         tau = inverse_forces(q, qd, qdd, ca.vertcat(*pushes), body)

@@ -6,16 +6,17 @@ eliminates λ and finds the least δ that makes the matrix convex, `newton_step`
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.spacetime.banded import assemble_gradient, assemble_hessian, solve, spread
+from motionstyle.spacetime.banded import BandAssembly, assemble_gradient, solve, spread
 from motionstyle.spacetime.barrier_problem import BarrierProblem
 from motionstyle.spacetime.elimination import Eliminated, eliminate
 from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
-from motionstyle.spacetime.spacetime_problem import COUNT, POINTS, Slopes, Values
+from motionstyle.spacetime.spacetime_problem import COUNT, Slopes, Values
 
 Array = NDArray[np.float64]
 METRIC = np.repeat([1.0, 1e-2, 1e-4], COUNT)  # of q, q̇, q̈ where curvature must be added
@@ -29,7 +30,8 @@ class Blocks:
 
     Attributes
     ----------
-    curved, gauss : over u, (F, 105, 105). mixed_curved, mixed_gauss : u × λ, (F, 105, 32).
+    curved, gauss : over u, (F, 105, 105). mixed_gauss : λ × u, (F, 32, 105). mixed_curved : λ × q,
+        (F, 32, 35), as forces enter the dynamics by place alone.
     inner_gauss : over λ, (F, 32, 32), and inner_diagonal (F, 32) of the barrier and w_λ.
     track_pull : ∂φ/∂q of the tracking term, (F, 35).
     force_pull : ∂φ/∂λ without residuals, (F, 32). by_force : ∂r/∂λ, (F, 35, 32), per 100 N.
@@ -92,8 +94,8 @@ def newton_blocks(
         barrier=barrier,
         curved=bend,
         gauss=gauss,
-        mixed_curved=FORCE_UNIT * mixed,
-        mixed_gauss=turned @ by_force,
+        mixed_curved=FORCE_UNIT * np.ascontiguousarray(np.swapaxes(mixed[:, q], 1, 2)),
+        mixed_gauss=np.swapaxes(by_force, 1, 2) @ by_state,
         inner_gauss=np.swapaxes(by_force, 1, 2) @ by_force,
         inner_diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
         track_pull=evaluator.tracking_pull(values.coordinates),
@@ -133,20 +135,33 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     which the valleys of E are not narrow.
     """
     more = 1 + delta
-    index = np.arange(4 * POINTS)
-    hessian = more * blocks.gauss
-    hessian += blocks.curved
-    if delta:
-        diagonal = np.arange(3 * COUNT)
-        hessian[:, diagonal, diagonal] += delta * METRIC
     inner = more * blocks.inner_gauss
-    inner[:, index, index] += blocks.inner_diagonal + delta
+    _diagonal(inner)[...] += blocks.inner_diagonal + delta
     cross = more * blocks.mixed_gauss
-    cross += blocks.mixed_curved
-    eliminated = eliminate(hessian, inner, cross, system.bearing_at)
+    cross[:, :, :COUNT] += blocks.mixed_curved
+    assembly = BandAssembly(system.evaluator.basis, COUNT)
+    eliminated = eliminate(
+        _hessians(blocks, delta), inner, np.swapaxes(cross, 1, 2), system.bearing_at, assembly.add
+    )
     fixed = np.where(system.fixed, RIGID, 0.0).ravel()
-    factor = assemble_hessian(system.evaluator.basis, hessian).factor(fixed + delta)
+    factor = assembly.whole().factor(fixed + delta)
     return None if factor is None else Factor(factor, eliminated, delta)
+
+
+def _hessians(blocks: Blocks, delta: float) -> Iterator[Array]:
+    """Yield each frame's Hessian over u at δ, (105, 105), always in the same memory."""
+    hessian = np.empty_like(blocks.gauss[0])
+    added, diagonal = delta * METRIC, _diagonal(hessian)
+    for gauss, curved in zip(blocks.gauss, blocks.curved, strict=True):
+        np.multiply(gauss, 1 + delta, out=hessian)
+        hessian += curved
+        diagonal += added
+        yield hessian
+
+
+def _diagonal(matrices: Array) -> Array:
+    """Return a view of the diagonals (..., n) of matrices (..., n, n)."""
+    return np.einsum("...ii->...i", matrices)
 
 
 def newton_step(
@@ -161,10 +176,10 @@ def newton_step(
         point.slack - (excess.rows + point.slack - point.elastic)
     )
     wanted = np.where(system.active, target / firm, 0.0)
-    gradient = np.einsum("fru,fr->fu", blocks.slopes.by_state, lift)
-    gradient[:, :COUNT] += np.einsum("fru,fr->fu", blocks.slopes.feet, foot_lift)
+    gradient = np.vecmat(lift, blocks.slopes.by_state)
+    gradient[:, :COUNT] += np.vecmat(foot_lift, blocks.slopes.feet)
     gradient[:, :COUNT] += blocks.track_pull - system.row_pull(blocks.slopes, wanted)
-    pull = np.einsum("fru,fr->fu", blocks.by_force, lift) + blocks.force_pull
+    pull = np.vecmat(lift, blocks.by_force) + blocks.force_pull
     eliminated = factor.eliminated
     answer = eliminated.forward(pull[..., None])
     gradient -= (eliminated.half.swapaxes(1, 2) @ answer)[..., 0]
@@ -192,14 +207,13 @@ def _whole_step(
     """Return the whole step and the slope of φ along it, from its part in (x, λ)."""
     evaluator, barrier, slopes = system.evaluator, blocks.barrier, blocks.slopes
     n, at, q = len(evaluator.limited), evaluator.limited, slice(0, COUNT)
-    change = np.einsum("fru,fu->fr", slopes.by_state, state)
-    change += np.einsum("fru,fu->fr", blocks.by_force, forces)
+    change = np.matvec(slopes.by_state, state) + np.matvec(blocks.by_force, forces)
     lift = change + excess.residuals
-    foot_lift = np.einsum("fru,fu->fr", slopes.feet, state[:, q]) + excess.feet
+    foot_lift = np.matvec(slopes.feet, state[:, q]) + excess.feet
     rows = np.empty_like(point.slack)
     rows[:, :n] = state[:, at]
     rows[:, n : 2 * n] = -state[:, at]
-    rows[:, 2 * n :] = np.einsum("fpq,fq->fp", slopes.heights, state[:, q])
+    rows[:, 2 * n :] = np.matvec(slopes.heights, state[:, q])
     rows *= evaluator.row_scale
     new_dual = np.where(system.active, wanted - blocks.stiff * rows, 0.0)
     elastic = np.where(system.active, new_dual / system.weight - point.elastic, 0.0)

@@ -24,6 +24,7 @@ class SolverSettings:
         since what it cuts depends on the machine.
     barrier : first μ. It is lowered to min(barrier_shrink·μ, μ^barrier_power) whenever the error
         of the barrier problem is below barrier_gate·μ.
+    pace : end as `slow` when E falls by less than this share in ten iterations; 0 is never.
     whole_steps : let λ that would turn negative stop short one by one and settle slacks in closed
         form, which gets along from poor starts; else the whole step stops short, which keeps
         primal and dual unknowns in step and converges faster.
@@ -32,12 +33,13 @@ class SolverSettings:
     """
 
     tolerance: float = 1e-6
-    iterations: int = 250
+    iterations: int = 500
     seconds: float = 900.0
     barrier: float = 1e-1
     barrier_shrink: float = 0.2
     barrier_power: float = 1.5
     barrier_gate: float = 10.0
+    pace: float = 0.0
     whole_steps: bool = False
     corrections: int = 3
     loose: float = 0.1
@@ -143,7 +145,7 @@ class InteriorPointResult:
     Attributes
     ----------
     status : `converged`, or why not: `iteration limit`, `time limit`, `no step found`,
-        `not a number`.
+        `not a number`, `slow` (only where a pace is asked for).
     point, values : where it ended. optimality : scaled error there.
     iterations, seconds : spent. trace : one entry for the start and one for every iteration.
     """

@@ -37,7 +37,10 @@ HEELS = tuple(i for i, name in enumerate(CONTACT_POINTS) if name.startswith("hee
 
 @dataclass(frozen=True)
 class SpacetimeSettings:
-    """Weights of the problem; see the module's text. Rows of inequalities are scaled by 1/unit."""
+    """Weights of the problem; see the module's text. Rows of inequalities are scaled by 1/unit.
+
+    sigmoid_gain : of γ in eq. (7), 1/rad. shoe_gain : of γ in eq. (9), 1/m.
+    """
 
     root_weight: float = 100.0
     foot_weight: float = 1e7
@@ -45,6 +48,7 @@ class SpacetimeSettings:
     range_weight: float = 1e6
     clearance_weight: float = 1e7
     sigmoid_gain: float = 500.0
+    shoe_gain: float = 500.0
     frames_per_knot: float = 2.0
 
 
@@ -124,12 +128,26 @@ class Values:
         return float((self.residuals**2).sum())
 
 
+def _places(rows: NDArray[np.int64], columns: NDArray[np.int64], wide: int) -> NDArray[np.int64]:
+    """Return the places of a matrix's entries in its `wide` columns laid end to end."""
+    return rows * wide + columns
+
+
+def _filled(numbers: Array, places: NDArray[np.int64], rows: int, columns: int) -> Array:
+    """Return matrices (F, rows, columns) with numbers (F, n) at places (n,), else 0."""
+    found = np.zeros((len(numbers), rows * columns))
+    found[:, places] = numbers
+    return found.reshape(len(numbers), rows, columns)
+
+
 class Evaluator:
     """Evaluates a problem; what does not change between evaluations is kept.
 
     Attributes
     ----------
     basis : of the splines. cone : edges of the friction cones, (F, 8, 4, 3).
+    forces_of, heights_of : the cones as one matrix from λ to forces (F, 24, 32), and the normals
+        as one from points to heights (F, 8, 24).
     bearing : coefficients that may push, (F, 32). scale : √w of the residuals, (35,).
     foot_rows : √w_f times what held points must keep to, (F, 8, 3, 3).
     limited : coordinates with ranges, and their low and high.
@@ -147,6 +165,15 @@ class Evaluator:
         )
         middle = feet.normals[:, :, None]
         self.cone = middle + feet.friction[..., None, None] * (self.cone - middle)
+        # As matrices of mostly zeros, since a few larger products are faster than many small ones.
+        each = np.arange(POINTS)
+        forces_of = np.zeros((frames, POINTS, 3, POINTS, 4))
+        forces_of[:, each, :, each] = self.cone.transpose(1, 0, 3, 2)
+        self.forces_of = forces_of.reshape(frames, 3 * POINTS, 4 * POINTS)
+        heights_of = np.zeros((frames, POINTS, POINTS, 3))
+        heights_of[:, each, each] = feet.normals
+        self.heights_of = heights_of.reshape(frames, POINTS, 3 * POINTS)
+        self.heel_stiffness = np.isin(each, HEELS) * problem.style.shoe_stiffness
         self.bearing = np.repeat(feet.held, 4, axis=1)
         self.scale = np.sqrt(
             np.concatenate([np.full(6, settings.root_weight), problem.style.preferences])
@@ -168,16 +195,23 @@ class Evaluator:
         self.row_active = np.ones((frames, self.rows), dtype=bool)
         self.row_active[:, 2 * n :] = ~feet.held
         slopes = problem.functions["forces_and_slopes"]
-        self.slope_patterns = [slopes.pattern(k) for k in range(1, 5)]
-        self.point_pattern = problem.functions["foot_points"].pattern(1)
+        wide = 3 * COUNT
+        self.slope_places = [
+            _places(*slopes.pattern(k), wide) + k0 for k, k0 in ((1, 0), (2, COUNT), (3, 2 * COUNT))
+        ]
+        self.force_places = _places(*slopes.pattern(4), 3 * POINTS)
+        self.point_places = _places(*problem.functions["foot_points"].pattern(1), COUNT)
         curvature = problem.functions["curvature"]
-        self.curvature_patterns = [curvature.pattern(k) for k in range(2)]
-        self.bend_pattern = problem.functions["foot_curvature"].pattern(0)
+        rows, columns = curvature.pattern(0)
+        self.curvature_places = _places(rows, columns, wide), _places(columns, rows, wide)
+        self.cross_places = _places(*curvature.pattern(1), COUNT)
+        rows, columns = problem.functions["foot_curvature"].pattern(0)
+        self.bend_places = _places(rows, columns, COUNT), _places(columns, rows, COUNT)
 
     def contact_forces(self, coefficients: Array) -> Array:
         """Return the forces Vᵀλ on the foot points, (F, 8, 3), N."""
-        split = coefficients.reshape(-1, POINTS, 4)
-        return np.einsum("fpc,fpca->fpa", split, self.cone)
+        forces = self.forces_of @ coefficients.reshape(-1, 4 * POINTS, 1)
+        return forces.reshape(-1, POINTS, 3)
 
     def values(self, controls: Array, coefficients: Array) -> Values:
         """Return the problem's values at control points (K, 35) and coefficients (F, 32)."""
@@ -230,14 +264,14 @@ class Evaluator:
         style, feet, gain = (
             self.problem.style,
             self.problem.feet,
-            self.problem.settings.sigmoid_gain,
+            self.problem.settings.shoe_gain,
         )
         height = ((points - feet.ground) * feet.normals).sum(axis=-1)
         squeeze = style.shoe_rest_length - height
         turn = np.tanh(gain * squeeze)
         on, steep = 0.5 * (turn + 1), 0.5 * gain * (1 - turn**2)
         bend = -2 * gain * turn * steep
-        heel = np.isin(np.arange(POINTS), HEELS) * style.shoe_stiffness
+        heel = self.heel_stiffness
         size = heel * on * squeeze
         by_height = -heel * (on + steep * squeeze)
         by_height2 = heel * (2 * steep + bend * squeeze)
@@ -257,30 +291,29 @@ class Evaluator:
         found = call(values.coordinates, values.rates, values.accelerations, total, self.parameters)
         frames = self.problem.frames
         by_state = np.zeros((frames, COUNT, 3 * COUNT))
-        for k in range(3):
-            rows, columns = self.slope_patterns[k]
-            by_state[:, rows, columns + k * COUNT] = found[k + 1]
-        by_force = np.zeros((frames, COUNT, 3 * POINTS))
-        by_force[:, self.slope_patterns[3][0], self.slope_patterns[3][1]] = found[4]
-        points = np.zeros((frames, 3 * POINTS, COUNT))
+        for places, part in zip(self.slope_places, found[1:4], strict=True):
+            by_state.reshape(frames, -1)[:, places] = part
+        by_force = _filled(found[4], self.force_places, COUNT, 3 * POINTS)
         given = self.problem.functions["foot_points"](values.coordinates, self.parameters)[1]
-        points[:, self.point_pattern[0], self.point_pattern[1]] = given
+        points = _filled(given, self.point_places, 3 * POINTS, COUNT)
         point_slopes = points.reshape(frames, POINTS, 3, COUNT)
-        heights = np.einsum("fpa,fpaq->fpq", self.problem.feet.normals, point_slopes)
-        _force, by_height, _bend = self._shoe(values.points)
-        by_force4 = by_force.reshape(frames, COUNT, POINTS, 3)
-        by_normal = np.einsum("frpa,fpa->frp", by_force4, self.problem.feet.normals)
+        heights = self.heights_of @ points
         if self.problem.style.shoe_stiffness > 0:
+            _force, by_height, _bend = self._shoe(values.points)
+            by_normal = by_force @ self.heights_of.swapaxes(1, 2)
             by_state[:, :, :COUNT] += (by_normal * by_height[:, None]) @ heights
         _passive, spring, _bend = self.passive(values.coordinates, values.rates)
         joints = np.arange(6, COUNT)
         by_state[:, joints, joints] += spring
         by_state[:, joints, joints + COUNT] += self.problem.style.passive.damping
-        by_cone = np.einsum("frpa,fpca->frpc", by_force4, self.cone).reshape(frames, COUNT, -1)
+        by_cone = by_force @ self.forces_of
         feet = (self.foot_rows @ point_slopes).reshape(frames, 3 * POINTS, COUNT)
+        by_state *= self.scale[:, None]
+        by_cone *= self.scale[:, None]
+        by_cone *= self.bearing[:, None]
         return Slopes(
-            by_state=by_state * self.scale[:, None],
-            by_coefficients=by_cone * self.scale[:, None] * self.bearing[:, None],
+            by_state=by_state,
+            by_coefficients=by_cone,
             feet=feet,
             heights=heights,
             by_force=by_force,
@@ -303,26 +336,22 @@ class Evaluator:
             values.coordinates, values.rates, values.accelerations, total, weights, self.parameters
         )
         hessian = np.zeros((frames, 3 * COUNT, 3 * COUNT))
-        rows, columns = self.curvature_patterns[0]
-        hessian[:, rows, columns] = found
-        hessian[:, columns, rows] = found
-        cross = np.zeros((frames, 3 * POINTS, COUNT))
-        cross[:, self.curvature_patterns[1][0], self.curvature_patterns[1][1]] = crossed
-        pull = np.einsum("fr,frx->fx", weights, slopes.by_force).reshape(frames, POINTS, 3)
+        for places in self.curvature_places:
+            hessian.reshape(frames, -1)[:, places] = found
+        cross = _filled(crossed, self.cross_places, 3 * POINTS, COUNT)
+        pull = (weights[:, None] @ slopes.by_force).reshape(frames, POINTS, 3)
         _force, by_height, by_height2 = self._shoe(values.points)
         push = (pull * feet.normals).sum(axis=-1)
-        split = cross.reshape(frames, POINTS, 3, COUNT)
         held = (foot_lift.reshape(frames, POINTS, 1, 3) @ self.foot_rows)[:, :, 0]
         bends = held + (pushes + push * by_height)[..., None] * feet.normals
         bent = self.problem.functions["foot_curvature"](
             values.coordinates, bends.reshape(frames, -1), self.parameters
         )[0]
-        rows, columns = self.bend_pattern
         point_part = np.zeros((frames, COUNT, COUNT))
-        point_part[:, rows, columns] = bent
-        point_part[:, columns, rows] = bent
+        for places in self.bend_places:
+            point_part.reshape(frames, -1)[:, places] = bent
         if self.problem.style.shoe_stiffness > 0:
-            by_normal = np.einsum("fpa,fpaq->fpq", feet.normals, split) * by_height[..., None]
+            by_normal = (self.heights_of @ cross) * by_height[..., None]
             mixed = np.swapaxes(by_normal, 1, 2) @ slopes.heights
             point_part += mixed + np.swapaxes(mixed, 1, 2)
             scaled = (push * by_height2)[..., None] * slopes.heights
@@ -332,8 +361,7 @@ class Evaluator:
         joints = np.arange(6, COUNT)
         hessian[:, joints, joints] += weights[:, 6:] * bend
         mixed = np.zeros((frames, 3 * COUNT, 4 * POINTS))
-        by_cone = np.einsum("fpaq,fpca->fqpc", split, self.cone).reshape(frames, COUNT, -1)
-        mixed[:, :COUNT] = by_cone * self.bearing[:, None]
+        mixed[:, :COUNT] = (np.swapaxes(cross, 1, 2) @ self.forces_of) * self.bearing[:, None]
         return hessian, mixed
 
 

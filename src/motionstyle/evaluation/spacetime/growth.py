@@ -118,7 +118,7 @@ def growth_row(
     other = replace(problem, style=replace(style, passive=stiffer))
     began = perf_counter()
     warm = solve_spacetime(
-        other, cold.point.controls, cold.coefficients, settings, warm=True, log=log
+        other, cold.point.controls, settings=settings, start_point=cold.point, log=log
     )
     again = perf_counter() - began
     per_iteration = 1000 * spent / max(1, cold.iterations)
