@@ -24,7 +24,7 @@ with job(snakemake.log[0]):
             problem = learning.problem(style)
             optimum = problem.basis().fit(load_motion(inputs[name]).coordinates)
             found["segments"][name] = landscape(problem, learning.controls, optimum)
-        if params.solves:
+        if params.solves > 0:
             found["cost"] = gradient_cost(learning, styles["before"], params.solves)
     except (MotionStyleError, FloatingPointError) as error:
         print(f"failed: {error}")

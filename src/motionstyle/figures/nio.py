@@ -155,7 +155,7 @@ def likelihood_figure(
     left.set_ylabel("E(X)")
     left.legend(fontsize="x-small")
     right.set_xscale("log")
-    right.set_ylim(-3, None)
+    right.set_ylim(0, None)
     right.set_xlabel("temperature τ")
     right.set_ylabel(r"$L_\tau$ (circles: (28); dotted: $G$)")
     return figure

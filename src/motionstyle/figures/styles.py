@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from motionstyle.figures.style import SERIES, SIDE_COLOURS, blank_figure, new_figure, styled
 from motionstyle.spacetime.style import JOINTS_29, Style
@@ -46,6 +47,9 @@ def _panels(figure: Figure, lines: Mapping[str, object]) -> list[Axes]:
     axes = list(figure.subplots(1, len(PANELS), sharey=True))
     for axis, (label, scale) in zip(axes, PANELS, strict=True):
         axis.set_xscale(scale)
+        if scale == "log":
+            axis.xaxis.set_minor_formatter(NullFormatter())
+            axis.set_xlim(0.05, 20.0)
         axis.set_xlabel(label, fontsize="x-small")
         axis.tick_params(labelsize="x-small")
         axis.grid(axis="y", color="0.92", lw=0.5)
@@ -102,6 +106,6 @@ def style_compared_figure(pairs: Sequence[tuple[str, Style, str, Style]]) -> Fig
                       label=other_name)  # fmt: skip
             axis.plot(after, range(len(lines)), "o", ms=3.5, color=SERIES[1], label=name)
         part.suptitle(f"{name} against {other_name} (means of both sides)")
-        part.legend(*axes[0].get_legend_handles_labels(), loc="lower right", ncols=2,
+        part.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2,
                     fontsize="x-small")  # fmt: skip
     return figure

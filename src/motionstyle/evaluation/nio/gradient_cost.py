@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from motionstyle.dynamics.passive import SIGMOID_GAIN
 from motionstyle.nio.derivatives import SIZE, energy_by_style
-from motionstyle.nio.inner import InnerSettings, inner_solve
-from motionstyle.nio.learning_problem import LearningProblem, target_cost
+from motionstyle.nio.inner import Inner, InnerSettings, inner_solve
+from motionstyle.nio.learning_problem import LearningProblem, cost_of_point, target_cost
 from motionstyle.nio.style_space import StyleSpace
+from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.style import Style
 
 STEP = 1e-3  # of scaled θ
-SOLVE = InnerSettings(0.0, 60.0, 200, 1e-6, 1e-3)
+SOLVE = InnerSettings(0.0, SIGMOID_GAIN, 200, 1e-6, 1e-6)
 
 
 def gradient_cost(
@@ -38,7 +40,9 @@ def gradient_cost(
     origin = space.coordinates(style)
     style = space.style(origin, style)
     began = perf_counter()
-    inner = inner_solve(learning, style, SOLVE)
+    problem = learning.problem(style)
+    result = solve_spacetime(problem, learning.controls)
+    inner = Inner(problem, result, cost_of_point(problem, result.point))
     first_s = perf_counter() - began
     began = perf_counter()
     target = target_cost(learning, style, SOLVE.gain)
