@@ -60,8 +60,10 @@ def step_of(style, k):
 
 
 def test_the_projected_motion_obeys_newton_and_g_is_not_negative(made_learning, style, solved):
-    values = target_cost(made_learning, made_learning.start).values
-    assert np.abs(values.root).max() < ROOT_LIMIT_N
+    assert made_learning.projection.root_n < ROOT_LIMIT_N
+    # Forces found anew give a little of that up for smaller torques.
+    cost = target_cost(made_learning, made_learning.start)
+    assert cost.root < 0.1 * cost.energy
     gap = target_cost(made_learning, style, GAIN).total - solved.cost.total
     assert gap >= 0
     for sample in (made_learning.start, style):
@@ -153,22 +155,20 @@ def test_the_papers_objective_never_rises(made_learning):
     assert found.style.vector().shape == (SIZE,)
 
 
-def test_planes_bound_g_from_below(made_learning):
+def test_planes_bound_g_from_below(made_learning, style, solved):
     """G is convex in α, so that every X_S bounds it at any other α (nio.md E3)."""
-    settings = InnerSettings(0.0, GAIN, 200, 1e-7, 1e-2)
-    empty = np.zeros(SIZE)
-    styles = []
-    for shares in (np.full(29, 1 / 29), np.random.default_rng(3).dirichlet(np.full(29, 8.0))):
-        vector = empty.copy()
-        vector[:29] = shares
-        styles.append(made_learning.start.with_vector(vector))
-    solves = [inner_solve(made_learning, s, settings) for s in styles]
-    targets = [target_cost(made_learning, s, GAIN) for s in styles]
-    slope, offset = plane(targets[0], solves[0].cost)
-    here = targets[0].total - solves[0].cost.total
-    assert slope @ styles[0].preferences + offset == pytest.approx(here, rel=1e-9)
-    there = targets[1].total - solves[1].cost.total
-    assert slope @ styles[1].preferences + offset <= there + 0.02 * targets[1].total
+    vector = style.vector()
+    vector[:29] = np.random.default_rng(3).dirichlet(np.full(29, 8.0))
+    other = style.with_vector(vector)
+    settings = InnerSettings(0.0, GAIN, 200, 1e-6, 1e-3)
+    found = inner_solve(made_learning, other, settings, None, solved.result.point)
+    target = target_cost(made_learning, style, GAIN)
+    slope, offset = plane(target, solved.cost)
+    here = target.total - solved.cost.total
+    assert slope @ style.preferences + offset == pytest.approx(here, rel=1e-9)
+    elsewhere = target_cost(made_learning, other, GAIN)
+    gap = elsewhere.total - found.cost.total
+    assert slope @ other.preferences + offset <= gap + 1e-3 * elsewhere.total
 
 
 def test_the_next_preferences_are_least_in_the_highest_plane():
@@ -187,7 +187,7 @@ def test_the_next_preferences_are_least_in_the_highest_plane():
 
 
 def test_preferences_alone_lower_g(made_learning):
-    found = learn_preferences(made_learning, PreferenceSettings(rounds=2), quiet)
+    found = learn_preferences(made_learning, PreferenceSettings(rounds=2, iterations=80), quiet)
     accepted = [row["objective"] for row in found.rows if row["accepted"]]
     assert accepted == sorted(accepted, reverse=True)
     assert accepted[-1] == min(r["objective"] for r in found.rows if r["optimality"] < 1)

@@ -18,7 +18,7 @@ from motionstyle.nio.styles_sheet import StyleRow
 from motionstyle.tables import plain
 
 # Farther than this from its fit a motion is another one: it fell, or a foot let go.
-FARTHEST_MM, FARTHEST_DEG = 50.0, 5.0
+FARTHEST_MM, FARTHEST_DEG = 30.0, 3.0
 
 
 def load_functions_of(code: str | Path, second_order: str | Path) -> dict[str, FrameFunction]:
