@@ -12,7 +12,8 @@ from motionstyle.nio.styles_sheet import StyleRow
 
 STYLE_COLUMNS = ("style", "clip", "set", "action", "mood")
 LEARNING_COLUMNS = (
-    *("config", *STYLE_COLUMNS, "algorithm", "inner", "iteration", "last", "accepted"),
+    *("config", *STYLE_COLUMNS, "algorithm", "inner", "iteration", "last", "last_step"),
+    "accepted",
     *("G", "G_over_E_target", "E_target", "E_synth", "muscle_target", "root_target"),
     *("muscle_synth", "root_synth", "muscle_gap_over_E_target", "root_gap_over_E_target"),
     *("objective", "not_rising", "joint_error_deg", "status", "optimality", "inner_iterations"),
@@ -75,6 +76,9 @@ def learning_rows(
                     row["not_rising"] = step["objective"] <= before * (1 + _RISE)
                 before = step["objective"]
             rows.append(row)
+        taken = [row for row in rows[-len(one["rows"]) :] if row["accepted"]]
+        if taken:
+            taken[-1]["last_step"] = True
         final = finals.get((one["cells"]["style"], one["algorithm"]))
         if final is not None and final["status"] != "failed":
             rows.append({**common, **_final(one["rows"][-1], final["rows"])})
