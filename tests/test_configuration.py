@@ -17,6 +17,7 @@ NAMES = (
     *("motions.tsv", "datasets.tsv", "embedded.yaml", "claims.yaml"),
     *("planted.yaml", "normative_gait.yaml", "syntheses.tsv"),
     *("similarity.yaml", "adaptations.tsv", "style_machines.yaml", "hand_style.yaml"),
+    *("nio.yaml", "styles.tsv"),
 )
 
 
