@@ -6,7 +6,7 @@ eq. (8). What is minimised, and what is the same for E(X_T) and E(X_S):
     E = Σ α_j Q_mj² + w_r Σ Q_0k²                      eq. (13), the energy that is reported
     + w_f Σ ‖C_p − target‖² over held points            footsteps; 1e7/m² holds them to 0.5 mm
     + w_λ Σ λ²                                          settles λ where eq. (8) leaves it open
-    + ½ρ Σ (excess over joint ranges, depth below the clearance)², kept small by a barrier
+    + ρ Σ (excess over joint ranges, depth below the clearance)², kept small by a barrier
     + Σ w (q − q̂)², only where a problem has a `Tracking`: learning keeps near its motion at first.
 
 Ends are free, or the first and last poses of a motion are kept. Derivatives per frame are with
