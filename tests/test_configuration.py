@@ -73,6 +73,8 @@ def test_shipped_configurations_agree_with_the_schema(root):
         for key in ("motions", "syntheses", "style_machines"):
             (root / raw[key]).write_text("")
             (ROOT / raw[key]).resolve(strict=True)
+        (root / raw["nio"]["styles"]).write_text("")
+        (ROOT / raw["nio"]["styles"]).resolve(strict=True)
         config = load_config(raw, SCHEMA, root)
         assert {key: config[key] for key in raw} == raw
         assert config["mirrors"] == ["../shared/mocap"]

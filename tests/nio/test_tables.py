@@ -92,7 +92,7 @@ def test_no_style_says_why(tmp_path):
 
 
 def judged_row(**changes):
-    row = dict.fromkeys(RESYNTHESIS_COLUMNS[6:-4], 1.0)
+    row = dict.fromkeys(RESYNTHESIS_COLUMNS[7:-4], 1.0)
     row |= {"ends": "free", "start": "target", "seed": None, "status": "converged"}
     return row | {"variant": "full", "beats_paper": None} | changes
 

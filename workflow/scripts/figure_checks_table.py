@@ -23,6 +23,7 @@ with job(snakemake.log[0]):
     segment = read_json(Path(inputs.segment))
     found = [*segment_checks(segment["segments"]), *segment["cost"]]
     rows += [{"style": segment["style"], "algorithm": "ours", **row} for row in found]
-    rows += likelihood_checks()
-    table = [plain({"config": params.config, **row}) for row in rows]
+    rows += [{"data": "planted", **row} for row in likelihood_checks()]
+    common = {"config": params.config, "data": "captured"}
+    table = [plain({**common, **row}) for row in rows]
     write_table(snakemake.output.table, CHECK_COLUMNS, table)

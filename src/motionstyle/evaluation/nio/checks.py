@@ -13,7 +13,17 @@ from motionstyle.dynamics.shoes import Shoes
 from motionstyle.spacetime.style import JOINTS_29, Style
 
 Array = NDArray[np.float64]
-CHECK_COLUMNS = ("config", "figure", "style", "algorithm", "quantity", "value", "unit", "note")
+CHECK_COLUMNS = (
+    "config",
+    "data",
+    "figure",
+    "style",
+    "algorithm",
+    "quantity",
+    "value",
+    "unit",
+    "note",
+)
 REACH_RAD, STEPS = np.radians(20.0), 4001
 BLUR_M = 0.01  # beyond the rest length by that much the shoe's sigmoid is 0 to 5e-5
 CLEAR_RAD = 0.01  # from the rest angle on the sigmoid is 1 to 1e-4: slopes are the springs' own

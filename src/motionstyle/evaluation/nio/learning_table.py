@@ -10,7 +10,7 @@ from typing import Any
 
 from motionstyle.nio.styles_sheet import StyleRow
 
-STYLE_COLUMNS = ("style", "clip", "set", "action", "mood")
+STYLE_COLUMNS = ("style", "clip", "data", "set", "action", "mood")
 LEARNING_COLUMNS = (
     *("config", *STYLE_COLUMNS, "algorithm", "inner", "iteration", "last", "last_step"),
     "accepted",
@@ -37,6 +37,7 @@ def style_cells(row: StyleRow) -> dict[str, Any]:
     return {
         "style": row.id,
         "clip": row.clip,
+        "data": "captured",
         "set": row.set,
         "action": row.action,
         "mood": row.mood,
