@@ -11,8 +11,8 @@ the last one's θ; only κ = 0 is NIO's own problem. G keeps θ from making X_T'
 of optimal. Springs are gentler (gain 60/rad) in these stages.
 
 Close to X_T the solver may follow an optimum that is not the lowest. So rounds follow, on the
-problem itself: a solve from X_T goes its own way, and θ is moved on from where it ends, as long as
-such solves end lower than what was followed (counterexamples to θ).
+problem itself: a solve from X_T goes its own way, and where it ends lower than what was followed
+(a counterexample to θ), θ is moved on from there.
 """
 
 from __future__ import annotations
@@ -244,10 +244,13 @@ def learn(
     for turn in range(settings.rounds):
         found = _from_target(learner, state, free)
         lower = found.inner.cost.total < (1 - NEGATIVE_GAP) * state.inner.cost.total
-        if turn > 0 and not lower:
+        if turn == 0 or lower:
+            record(found, free, True)
+            state, trust = found, 1.0
+        before = state.objective
+        state, trust = _stage(learner, state, free, trust, record)
+        if not lower and state.objective > (1 - settings.least_gain) * before:
             break
-        record(found, free, True)
-        state, trust = _stage(learner, found, free, 1.0, record)
     about = dict(learning.start.about) | {
         "recipe": "ours",
         "solver_status": state.inner.result.status,
