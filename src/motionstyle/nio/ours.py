@@ -67,7 +67,9 @@ class OurSettings:
     iterations, tolerance, barrier : of inner solves; a step whose solve ends above `usable` is
         refused.
     damping : of the normal equations, relative. least_gain : of the objective, below which a stage
-        ends. rounds, round_steps : of solves from X_T that go their own way, and steps after each.
+        ends.
+    rounds, round_steps, round_gain : of solves from X_T that go their own way, steps after each,
+        and the springs' gain in them. final_steps : at the paper's gain.
     """
 
     stages: Sequence[Stage]
@@ -85,6 +87,8 @@ class OurSettings:
     least_gain: float
     rounds: int = 0
     round_steps: int = 0
+    round_gain: float = SIGMOID_GAIN
+    final_steps: int = 0
 
 
 @dataclass(frozen=True)
@@ -240,7 +244,7 @@ def learn(
         place = state.place
     if state is None:
         raise ValueError("the learner needs at least one stage")
-    free = Stage(0.0, settings.round_steps, SIGMOID_GAIN)
+    free = Stage(0.0, settings.round_steps, settings.round_gain)
     for turn in range(settings.rounds):
         found = _from_target(learner, state, free)
         lower = found.inner.cost.total < (1 - NEGATIVE_GAP) * state.inner.cost.total
@@ -251,6 +255,12 @@ def learn(
         state, trust = _stage(learner, state, free, trust, record)
         if not lower and state.objective > (1 - settings.least_gain) * before:
             break
+    final = Stage(0.0, settings.final_steps, SIGMOID_GAIN)
+    found = learner.state(state.place, final, None, state.inner)
+    if not learner.usable(found):
+        found = _from_target(learner, state, final)
+    record(found, final, True)
+    state, trust = _stage(learner, found, final, trust, record)
     about = dict(learning.start.about) | {
         "recipe": "ours",
         "solver_status": state.inner.result.status,
