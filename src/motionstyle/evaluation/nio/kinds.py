@@ -74,10 +74,13 @@ def judge_kind(
 
     Parameters
     ----------
-    perturbed : seeds of starts away from X_T, for kinds that take them.
+    perturbed : seeds of starts away from X_T, for kinds that take them, beside the one through
+        gentler problems.
     """
     kind = KINDS[name]
-    starts = ["target", *(f"perturbed_{seed}" for seed in perturbed if kind.perturbed)]
+    starts = ["target"]
+    if kind.perturbed:
+        starts += ["gentle", *(f"perturbed_{seed}" for seed in perturbed)]
     style = judged_style(name, learning, learnt)
     keep = KEPT_ENDS if kind.ends == "fixed" else 0
     judged = judge(learning, style, starts, keep_ends=keep)
