@@ -192,8 +192,6 @@ JUDGED = [
 
 
 wildcard_constraints:
-    algorithm="|".join(LEARNERS),
-    kind="|".join(KINDS),
     task="|".join(TASKS) or "none",
     clip="|".join(CLIPS) or "none",
     planted="|".join(PLANTED) or "none",

@@ -71,6 +71,8 @@ rule judge_style:
         LOGS / "nio/judged/{kind}/{clip}.log",
     benchmark:
         BENCHMARKS / "nio/judged/{kind}/{clip}.tsv"
+    wildcard_constraints:
+        kind="|".join(KINDS),
     conda:
         "../envs/motionstyle.yaml"
     threads: 1

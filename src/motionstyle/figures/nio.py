@@ -62,7 +62,8 @@ def segment_figure(segments: Mapping[str, Curve], title: str) -> Figure:
     """
     figure = new_figure(2.8)
     axes = figure.subplots(1, len(segments), sharey=True, squeeze=False)[0]
-    for axis, (name, found) in zip(axes, segments.items(), strict=True):
+    ordered = [(name, segments[name]) for name in ("before", "after") if name in segments]
+    for axis, (name, found) in zip(axes, ordered, strict=True):
         s, total = np.asarray(found["s"]), np.asarray(found["total"])
         start, end = np.interp([0.0, 1.0], s, total)
         axis.plot(s, total / start, color="black", lw=1.4, label="all that is minimised")

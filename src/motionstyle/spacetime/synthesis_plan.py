@@ -13,6 +13,7 @@ from motionstyle.body.body import Body
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import read_json
 from motionstyle.motion.motion import Motion
+from motionstyle.motion.resample import resample
 from motionstyle.spacetime.captured_footprints import footprints_of
 from motionstyle.spacetime.edits import (
     Edits,
@@ -40,6 +41,8 @@ from motionstyle.spacetime.synthesis_sheet import FootprintSource, SynthesisRow
 
 Array = NDArray[np.float64]
 
+RATE_HZ = 30.0  # of the paper; clips with force plates are fitted at 60
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -64,7 +67,7 @@ class Plan:
 
 
 def example_window(motion: Motion, row: SynthesisRow) -> Motion:
-    """Return the row's window of a motion.
+    """Return the row's window of a motion, at the paper's rate where its own is finer.
 
     Raises
     ------
@@ -78,7 +81,8 @@ def example_window(motion: Motion, row: SynthesisRow) -> Motion:
             f"synthesis {row.id}: last_frame is {last}, but {motion.id} ends at frame "
             f"{motion.frames - 1}"
         )
-    return motion.window(first, last)
+    window = motion.window(first, last)
+    return resample(window, RATE_HZ) if window.rate_hz > RATE_HZ else window
 
 
 def planned_footprints(
