@@ -49,7 +49,6 @@ def _panels(figure: Figure, lines: Mapping[str, object]) -> list[Axes]:
         axis.set_xscale(scale)
         if scale == "log":
             axis.xaxis.set_minor_formatter(NullFormatter())
-            axis.set_xlim(0.05, 20.0)
         axis.set_xlabel(label, fontsize="x-small")
         axis.tick_params(labelsize="x-small")
         axis.grid(axis="y", color="0.92", lw=0.5)
