@@ -8,6 +8,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import yaml
 from jsonschema import Draft202012Validator, FormatChecker
 from jsonschema.exceptions import ValidationError
 
@@ -35,6 +36,25 @@ _RULES = {
 _KEY_RULES = {"additionalProperties", "required"}
 
 KeyPath = tuple[str | int, ...]
+
+
+def read_settings(path: str | Path, schema_path: str | Path) -> dict[str, Any]:
+    """Read a stage's settings, a YAML file, and check them; see `load_config`.
+
+    Raises
+    ------
+    MotionStyleError
+        With the file's name, and every problem, one a line.
+    """
+    path = Path(path)
+    try:
+        raw = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise MotionStyleError(f"{path}: not a readable settings file ({error})") from error
+    try:
+        return load_config(raw, schema_path, path.parent)
+    except MotionStyleError as error:
+        raise MotionStyleError(f"{path}:\n{error}") from error
 
 
 def load_config(

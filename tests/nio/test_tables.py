@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from motionstyle.configuration import read_settings
 from motionstyle.dynamics.passive import PassiveParameters
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.checks import segment_checks, shoe_checks, spring_checks
@@ -18,7 +19,7 @@ from motionstyle.evaluation.nio.learning_table import (
 )
 from motionstyle.evaluation.nio.likelihood import likelihood_checks, tempered
 from motionstyle.evaluation.nio.style_parameters import PARAMETER_COLUMNS, style_parameter_rows
-from motionstyle.nio.settings import our_settings, paper_settings, read_nio_settings
+from motionstyle.nio.settings import our_settings, paper_settings
 from motionstyle.nio.styles_sheet import COLUMNS, read_styles
 from motionstyle.spacetime.style import Style, load_style, save_no_style
 
@@ -68,7 +69,7 @@ def test_faults_of_the_sheet_are_told(tmp_path, rows, message):
 
 
 def test_shipped_settings_make_both_learners_settings():
-    settings = read_nio_settings(ROOT / "config/nio.yaml", SCHEMA)
+    settings = read_settings(ROOT / "config/nio.yaml", SCHEMA)
     for schedule in settings["ours"]["schedules"]:
         pulls = [stage.closeness for stage in our_settings(settings, schedule).stages]
         assert pulls == sorted(pulls, reverse=True)
@@ -81,7 +82,7 @@ def test_a_wrong_setting_is_told_with_its_file(tmp_path):
     text = (ROOT / "config/nio.yaml").read_text(encoding="utf-8")
     (tmp_path / "nio.yaml").write_text(text.replace("damping:", "dampign:"), encoding="utf-8")
     with pytest.raises(MotionStyleError, match=r"nio\.yaml:\n(.|\n)*did you mean damping"):
-        read_nio_settings(tmp_path / "nio.yaml", SCHEMA)
+        read_settings(tmp_path / "nio.yaml", SCHEMA)
 
 
 def test_no_style_says_why(tmp_path):
@@ -108,7 +109,7 @@ def test_learning_and_judging_become_tables(tmp_path):
     cells = style_cells(row)
     steps = [
         {"iteration": k, "objective": g, "G": g, "status": "iteration limit", "seconds": 1.0 * k,
-         "alpha_on_idle_joints": 0.1, "accepted": True}
+         "alpha_on_idle_joints": 0.1, "passive_over_muscle": 2.0, "accepted": True}
         for k, g in enumerate((9.0, 5.0, 6.0))
     ]  # fmt: skip
     judged = [
@@ -130,6 +131,21 @@ def test_learning_and_judging_become_tables(tmp_path):
     assert [one.get("beats_paper") for one in found] == [None, None, True, None]
     judged[1]["rows"][0]["status"] = "iteration limit"
     assert resynthesis_rows(judged, "test")[2]["beats_paper"] is False
+
+
+def test_a_refused_trial_at_the_end_tells_nothing_of_the_style(tmp_path):
+    (row,) = read_styles(sheet(tmp_path, {}))
+    cells = style_cells(row)
+    steps = [
+        {"iteration": k, "objective": 1.0, "G": 1.0, "status": "converged", "seconds": 1.0 * k,
+         "alpha_on_idle_joints": idle, "passive_over_muscle": idle, "accepted": taken}
+        for k, (idle, taken) in enumerate(((0.1, True), (0.9, False)))
+    ]  # fmt: skip
+    judged = [record(cells, "ours", [judged_row(algorithm="ours", total=1.0)])]
+    rows = learning_rows([record(cells, "ours", steps)], judged, "test")
+    assert rows[0]["last_step"]
+    assert rows[-1]["last"]
+    assert rows[-1]["alpha_on_idle_joints"] == rows[-1]["passive_over_muscle"] == 0.1
 
 
 def test_styles_are_compared_by_ratio_and_angles_by_difference(tmp_path):

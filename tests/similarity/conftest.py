@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from motionstyle.body.layout import COORDINATE_INDEX
+from motionstyle.configuration import read_settings
 from motionstyle.motion.motion import Motion
 from motionstyle.similarity.bank import Bank, build_bank
 from motionstyle.similarity.events import EventRules
-from motionstyle.similarity.settings import read_settings
 
 sys.path.append(str(Path(__file__).parents[1] / "evaluation"))
 import synthetic_walk

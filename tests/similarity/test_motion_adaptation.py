@@ -11,6 +11,7 @@ from scipy.sparse import csc_matrix
 
 from motionstyle.body.kinematics import contact_points, forward_kinematics, points_in_world
 from motionstyle.body.layout import NODES
+from motionstyle.configuration import read_settings
 from motionstyle.errors import MotionStyleError
 from motionstyle.motion.storage import load_motion, save_motion
 from motionstyle.similarity.adapt_measures import measure, models_without, pair_scores
@@ -20,7 +21,6 @@ from motionstyle.similarity.adaptation import adapt
 from motionstyle.similarity.blocks import Block, assemble, block_function
 from motionstyle.similarity.footholds import cut_example, make_footholds
 from motionstyle.similarity.judge import judge, judge_motions
-from motionstyle.similarity.settings import read_settings
 from motionstyle.similarity.solver import solve
 from motionstyle.similarity.symbolic_body import pose_function
 from motionstyle.similarity.tasks import Task, read_tasks

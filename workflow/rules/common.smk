@@ -9,7 +9,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
 import motionstyle
-from motionstyle.configuration import load_config
+from motionstyle.configuration import load_config, read_settings
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.kinds import KINDS
 from motionstyle.evaluation.nio.learners import LEARNERS
@@ -19,10 +19,9 @@ from motionstyle.mocap.datasets.doors import read_datasets
 from motionstyle.mocap.planted.variants import read_planted
 from motionstyle.mocap.datasets.sheet import EMBEDDED, MARKER_FILES, read_sheet
 from motionstyle.mocap.datasets.wheel import read_wheel_pin
-from motionstyle.nio.settings import our_settings, read_nio_settings
+from motionstyle.nio.settings import our_settings
 from motionstyle.nio.styles_sheet import read_styles
 from motionstyle.spacetime.synthesis_sheet import read_syntheses
-from motionstyle.similarity.settings import read_settings
 from motionstyle.similarity.tasks import read_tasks
 
 ROOT = Path(workflow.basedir)
@@ -80,7 +79,7 @@ try:
     # Styles are learnt from clips of the sheet; as with syntheses, rows of shipped sheets whose
     # clips are not there are left out.
     NIO = CONFIG["nio"]
-    NIO_SETTINGS = read_nio_settings(NIO["settings"], ROOT / "workflow/schemas/nio.schema.json")
+    NIO_SETTINGS = read_settings(NIO["settings"], ROOT / "workflow/schemas/nio.schema.json")
     our_settings(NIO_SETTINGS, NIO["schedule"])
     SHIPPED_STYLES = Path(NIO["styles"]).resolve().parent == (ROOT / "config").resolve()
     STYLES = {

@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from motionstyle.dynamics.codegen import load_functions
-from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.spacetime.growth import growth_row
 from motionstyle.files import write_json
@@ -18,8 +16,7 @@ with job(snakemake.log[0]):
     frames = int(snakemake.wildcards.frames)
     try:
         stretch = load_motion(inputs.motion).window(study["first_frame"], study["last_frame"])
-        functions = load_functions(dynamics_functions, Path(inputs.code))
-        functions |= load_functions(second_order_functions, Path(inputs.second_order))
+        functions = load_compiled(inputs.code, inputs.second_order)
         style = initial_style_of(stretch, functions)
         whole = frames <= study["to_the_end"]
         iterations = SolverSettings.iterations if whole else study["iterations"]

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.kinds import judge_kind
-from motionstyle.evaluation.nio.records import judging_record, load_functions_of, load_learning
+from motionstyle.evaluation.nio.records import judging_record, load_learning
 from motionstyle.files import write_json
 from motionstyle.jobs import job
 from motionstyle.motion.storage import save_failure, save_motion
@@ -15,7 +16,7 @@ from motionstyle.tables import plain
 with job(snakemake.log[0]):
     inputs, output, wildcards = snakemake.input, snakemake.output, snakemake.wildcards
     row = read_style_row(snakemake.params.sheet, wildcards.clip)
-    functions = load_functions_of(inputs.code, inputs.second_order)
+    functions = load_compiled(inputs.code, inputs.second_order)
     learning = None
     try:
         learning = load_learning(row, inputs.motion, functions)
@@ -32,6 +33,4 @@ with job(snakemake.log[0]):
         save_motion(output.target, learning.target)
         record = judging_record(row, wildcards.kind, learning)
         rows = [plain(one) for one in found.rows]
-        write_json(
-            Path(output.rows), {**record, "status": "done", "rows": rows, "trace": found.trace}
-        )
+        write_json(Path(output.rows), {**record, "status": "done", "rows": rows})

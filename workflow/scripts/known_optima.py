@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from motionstyle.dynamics.codegen import load_functions
-from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.evaluation.spacetime.known_optima import COLUMNS, known_optima, known_optimum_row
 from motionstyle.evaluation.spacetime.known_truth import optimum_row
 from motionstyle.files import write_json
@@ -14,8 +12,7 @@ from motionstyle.tables import write_table
 
 with job(snakemake.log[0]):
     inputs, params = snakemake.input, snakemake.params
-    functions = load_functions(dynamics_functions, Path(inputs.code))
-    functions |= load_functions(second_order_functions, Path(inputs.second_order))
+    functions = load_compiled(inputs.code, inputs.second_order)
     problems = known_optima(load_motion(inputs.motion).body, functions)
     rows = [known_optimum_row(known, seed=1, log=print) for known in problems]
     write_table(snakemake.output.table, COLUMNS, [{"config": params.config, **row} for row in rows])

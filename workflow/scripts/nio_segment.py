@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.gradient_cost import gradient_cost
-from motionstyle.evaluation.nio.records import load_functions_of, load_learning
+from motionstyle.evaluation.nio.records import load_learning
 from motionstyle.evaluation.spacetime.landscape import landscape
 from motionstyle.files import write_json
 from motionstyle.jobs import job
@@ -15,7 +16,7 @@ from motionstyle.spacetime.style import load_style
 with job(snakemake.log[0]):
     inputs, params = snakemake.input, snakemake.params
     row = read_style_row(params.sheet, params.clip)
-    functions = load_functions_of(inputs.code, inputs.second_order)
+    functions = load_compiled(inputs.code, inputs.second_order)
     found = {"style": row.id, "segments": {}, "cost": []}
     try:
         learning = load_learning(row, inputs.motion, functions)

@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from motionstyle.dynamics.codegen import load_functions
-from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.spacetime.landscape import landscape
 from motionstyle.evaluation.spacetime.sensitivity import BASE, solve_choice
@@ -20,8 +18,7 @@ with job(snakemake.log[0]):
     found = {"landscape": {}}
     try:
         motion = load_motion(inputs.motion).window(study["first_frame"], study["last_frame"])
-        functions = load_functions(dynamics_functions, Path(inputs.code))
-        functions |= load_functions(second_order_functions, Path(inputs.second_order))
+        functions = load_compiled(inputs.code, inputs.second_order)
         learning = learning_problem(motion, functions)
         settings = SolverSettings(iterations=study["iterations"])
         solved = solve_choice(learning, choice, settings)

@@ -2,13 +2,14 @@
 
 from pathlib import Path
 
+from motionstyle.configuration import read_settings
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.learners import learn_by_name
-from motionstyle.evaluation.nio.records import load_functions_of, load_learning
+from motionstyle.evaluation.nio.records import load_learning
 from motionstyle.evaluation.nio.twins import TEST, make_twin, twin_row
 from motionstyle.files import write_json
 from motionstyle.jobs import job
-from motionstyle.nio.settings import read_nio_settings
 from motionstyle.nio.styles_sheet import read_style_row
 from motionstyle.tables import plain
 
@@ -16,8 +17,8 @@ with job(snakemake.log[0]):
     inputs, params = snakemake.input, snakemake.params
     seed, noise = int(snakemake.wildcards.seed), float(snakemake.wildcards.noise)
     row = read_style_row(params.sheet, params.clip)
-    settings = read_nio_settings(params.settings_file, inputs.schema)
-    functions = load_functions_of(inputs.code, inputs.second_order)
+    settings = read_settings(params.settings_file, inputs.schema)
+    functions = load_compiled(inputs.code, inputs.second_order)
     spectrum = []
 
     def learner(learning):

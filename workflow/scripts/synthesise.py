@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from motionstyle.dynamics.codegen import load_functions
-from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import write_json
 from motionstyle.jobs import job
@@ -20,8 +18,7 @@ with job(snakemake.log[0]):
     try:
         example = example_window(load_motion(inputs.example), row)
         plan = load_plan(row, example, inputs.table, inputs.status)
-        functions = load_functions(dynamics_functions, Path(inputs.code))
-        functions |= load_functions(second_order_functions, Path(inputs.second_order))
+        functions = load_compiled(inputs.code, inputs.second_order)
         found = synthesise(row, plan, load_style(Path(inputs.style)), functions)
         if found.motion is None:
             raise MotionStyleError(f"the solver broke down: {found.report['reason']}")

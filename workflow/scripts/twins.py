@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from motionstyle.dynamics.codegen import load_functions
-from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.dynamics.compiled import load_compiled
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.spacetime.twins import TEST, twin_rows
 from motionstyle.files import write_json
@@ -25,8 +23,7 @@ with job(snakemake.log[0]):
     try:
         example = example_window(load_motion(inputs.example), row)
         plan = load_plan(row, example, inputs.table, inputs.status)
-        functions = load_functions(dynamics_functions, Path(inputs.code))
-        functions |= load_functions(second_order_functions, Path(inputs.second_order))
+        functions = load_compiled(inputs.code, inputs.second_order)
         settings = SolverSettings(iterations=twins["iterations"])
         motion, rows = twin_rows(row, plan, style, functions, twins["starts"], settings)
     except MotionStyleError as error:

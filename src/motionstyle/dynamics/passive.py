@@ -27,9 +27,16 @@ class PassiveParameters:
     rest_angle: Array
 
 
-def sigmoid(angle: Array) -> Array:
-    """Return γ(x) = ½(tanh(500 x) + 1) of eq. (7)."""
-    return 0.5 * (np.tanh(SIGMOID_GAIN * angle) + 1)
+def sigmoid(x: Array, gain: float = SIGMOID_GAIN) -> Array:
+    """Return γ(x) = ½(tanh(gain·x) + 1) of eq. (7), in the paper with a gain of 500."""
+    return 0.5 * (np.tanh(gain * x) + 1)
+
+
+def sigmoid_slopes(x: Array, gain: float = SIGMOID_GAIN) -> tuple[Array, Array, Array]:
+    """Return γ(x), γ′(x) and γ″(x)."""
+    turn = np.tanh(gain * x)
+    steep = 0.5 * gain * (1 - turn**2)
+    return 0.5 * (turn + 1), steep, -2 * gain * turn * steep
 
 
 def passive_forces(parameters: PassiveParameters, angles: Array, rates: Array) -> Array:

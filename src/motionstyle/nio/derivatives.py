@@ -14,6 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.body.layout import JOINT_COORDINATES
+from motionstyle.dynamics.passive import sigmoid_slopes
+from motionstyle.dynamics.shoes import Shoes
+from motionstyle.spacetime.sensitivity import OptimumHessian
+from motionstyle.spacetime.solver_point import InteriorPointResult
 from motionstyle.spacetime.spacetime_problem import (
     COUNT,
     HEELS,
@@ -45,8 +49,7 @@ def _springs(evaluator: Evaluator, values: Values) -> list[_Spring]:
     gain, passive = problem.settings.sigmoid_gain, problem.style.passive
     away = values.coordinates[:, JOINT_COORDINATES] - passive.rest_angle
     rates = values.rates[:, JOINT_COORDINATES]
-    turn = np.tanh(gain * away)
-    above, steep = 0.5 * (turn + 1), 0.5 * gain * (1 - turn**2)
+    above, steep, _bend = sigmoid_slopes(away, gain)
     _force, slope, bend = evaluator.passive(values.coordinates, values.rates)
     none, ones = np.zeros_like(away), np.ones_like(away)
     return [
@@ -73,19 +76,15 @@ def energy_by_style(problem: SpacetimeProblem, values: Values) -> Array:
 def _energy_by_shoes(evaluator: Evaluator, values: Values) -> Array:
     """Return ∂E/∂(k_shoe, h̄): eq. (9)'s force along each heel's normal, by virtual work."""
     problem = evaluator.problem
-    gain, style, feet = problem.settings.shoe_gain, problem.style, problem.feet
+    style, feet = problem.style, problem.feet
     slopes = evaluator.slopes(values)
     by_force = slopes.by_force.reshape(problem.frames, COUNT, POINTS, 3)
     by_push = np.einsum("frpa,fpa->frp", by_force, feet.normals)[:, :, HEELS]
     height = ((values.points - feet.ground) * feet.normals).sum(axis=-1)[:, HEELS]
-    squeeze = style.shoe_rest_length - height
-    turn = np.tanh(gain * squeeze)
-    on, steep = 0.5 * (turn + 1), 0.5 * gain * (1 - turn**2)
+    shoes = Shoes(style.shoe_stiffness, style.shoe_rest_length, problem.settings.shoe_gain)
     weighted = 2 * values.residuals * evaluator.scale
     push = np.einsum("fr,frp->fp", weighted, by_push)
-    by_stiffness = (push * on * squeeze).sum()
-    by_length = (push * style.shoe_stiffness * (on + steep * squeeze)).sum()
-    return np.array([by_stiffness, by_length])
+    return (push[..., None] * shoes.force_by_parameters(height)).sum(axis=(0, 1))
 
 
 def mixed_derivatives(
@@ -147,3 +146,20 @@ def _gradient(
         np.einsum("frx,fr->fx", slopes.by_state, doubled),
         np.einsum("frx,fr->fx", slopes.by_coefficients, doubled),
     )
+
+
+def joint_response(
+    problem: SpacetimeProblem, found: InteriorPointResult, chain: Array
+) -> tuple[Array, Array]:
+    """Return how an optimum's joint angles (F·29, 147), rad, and control points (K·35, 147) move.
+
+    Parameters
+    ----------
+    found : the optimum. chain : ∂θ/∂y of the coordinates y that are moved, (147, 147).
+    """
+    mixed = mixed_derivatives(problem, found.values, found.coefficients)
+    controls = OptimumHessian.at(Evaluator(problem), found).sensitivity(*mixed).controls @ chain
+    basis = problem.basis()
+    moved = basis.evaluate(controls.reshape(basis.controls, -1))[0]
+    moved = moved.reshape(problem.frames, COUNT, SIZE)[:, JOINT_COORDINATES]
+    return moved.reshape(-1, SIZE), controls

@@ -47,6 +47,35 @@ class Inner:
     cost: Cost
 
 
+@dataclass(frozen=True)
+class Learnt:
+    """A learnt style and how it came about: one row per step of θ (`tables/nio_learning.csv`)."""
+
+    style: Style
+    rows: list[dict[str, Any]]
+
+
+def learnt(
+    learning: LearningProblem,
+    recipe: str,
+    style: Style,
+    inner: Inner,
+    rows: list[dict[str, Any]],
+) -> Learnt:
+    """Return a learnt style that says where it comes from.
+
+    Parameters
+    ----------
+    inner : the last solve at this style. rows : of all steps.
+    """
+    about = dict(learning.start.about) | {
+        "recipe": recipe,
+        "solver_status": inner.result.status,
+        "optimality": inner.result.optimality,
+    }
+    return Learnt(replace(style, about=about), rows)
+
+
 def inner_solve(
     learning: LearningProblem,
     style: Style,

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.dynamics.inverse import GRAVITY
+from motionstyle.motion.difference import joint_rms_deg
 from motionstyle.motion.motion import Motion
 from motionstyle.nio.inner import effective_number
 from motionstyle.nio.learning_problem import (
     LearningProblem,
     cost_of_point,
-    rms_joint_error_deg,
     target_cost,
 )
 from motionstyle.spacetime.continuation import solve_spacetime
@@ -38,7 +38,6 @@ class Judged:
 
     rows: list[dict[str, Any]]
     motion: Motion
-    trace: list[dict[str, float]]
 
 
 def judge(
@@ -77,7 +76,7 @@ def judge(
     best = min(done or [row["total"] for row in rows])
     for row, result in zip(rows, results, strict=True):
         row["above_best_pct"] = 100 * (row["total"] / best - 1)
-        row["from_first_start_deg"] = rms_joint_error_deg(
+        row["from_first_start_deg"] = joint_rms_deg(
             result.values.coordinates, results[0].values.coordinates
         )
     first = results[0]
@@ -87,8 +86,7 @@ def judge(
         coordinates=first.values.coordinates,
         contact_forces=first.values.forces + first.values.shoe_forces,
     )
-    trace = [{"iteration": t.iteration, "E": t.energy} for t in first.trace]
-    return Judged(rows, motion, trace)
+    return Judged(rows, motion)
 
 
 def _start(learning: LearningProblem, problem: SpacetimeProblem, name: str, keep: int) -> Array:
@@ -125,12 +123,10 @@ def _measured(
         "iterations": result.iterations,
         "solver_seconds": result.seconds,
         "joint_error_deg": learning.joint_error_deg(values.coordinates),
-        "joint_error_middle_deg": rms_joint_error_deg(
+        "joint_error_middle_deg": joint_rms_deg(
             values.coordinates[middle], learning.coordinates[middle]
         ),
-        "captured_error_deg": rms_joint_error_deg(
-            values.coordinates, learning.captured.coordinates
-        ),
+        "captured_error_deg": joint_rms_deg(values.coordinates, learning.captured.coordinates),
         "root_path_rms_cm": 100 * float(np.sqrt((place**2).mean())),
         "ground_reaction_rms_pctbw": 100
         * float(np.sqrt(((forces - wanted)[:, 1] ** 2).mean()) / weight),
@@ -145,7 +141,7 @@ def _measured(
         "foot_error_mm": 1000
         * float(np.abs(values.foot_residuals).max() / np.sqrt(problem.settings.foot_weight)),
         "effective_joints_in_alpha": effective_number(problem.style.preferences),
-        "passive_over_muscle": float((values.passive**2).sum() / max(square.sum(), 1e-12)),
+        "synth_passive_over_muscle": float((values.passive**2).sum() / max(square.sum(), 1e-12)),
     }
 
 

@@ -19,6 +19,7 @@ from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.codegen import FrameFunction
 from motionstyle.dynamics.passive import PassiveParameters
 from motionstyle.errors import MotionStyleError
+from motionstyle.motion.difference import joint_rms_deg
 from motionstyle.motion.motion import Motion
 from motionstyle.motion.resample import resample
 from motionstyle.spacetime.edits import Edits, edit_ranges
@@ -112,7 +113,7 @@ class LearningProblem:
 
     def joint_error_deg(self, coordinates: Array) -> float:
         """Return the rms difference of joint angles (F, 35) from X_T, degrees."""
-        return rms_joint_error_deg(coordinates, self.coordinates)
+        return joint_rms_deg(coordinates, self.coordinates)
 
 
 @dataclass(frozen=True)
@@ -128,12 +129,6 @@ class Cost:
     muscle: float
     root: float
     values: Values
-
-
-def rms_joint_error_deg(found: Array, wanted: Array) -> float:
-    """Return the rms difference of the 29 joint angles of two motions (F, 35), degrees."""
-    away = (found - wanted)[:, JOINT_COORDINATES]
-    return float(np.degrees(np.sqrt((away**2).mean())))
 
 
 def learning_problem(
@@ -168,7 +163,7 @@ def learning_problem(
     projection = Projection(
         status=found.status,
         optimality=found.optimality,
-        angle_rms_deg=rms_joint_error_deg(values.coordinates, captured.coordinates),
+        angle_rms_deg=joint_rms_deg(values.coordinates, captured.coordinates),
         place_rms_mm=1000 * float(np.sqrt((away[:, :3] ** 2).sum(axis=1).mean())),
         root_n=float(np.abs(values.root).max()),
     )

@@ -7,7 +7,6 @@ budget of inner solves. Inner solves are the paper's, cut off early.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -16,9 +15,15 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from motionstyle.dynamics.passive import SIGMOID_GAIN
-from motionstyle.nio.inner import InnerSettings, inner_solve, learning_row
+from motionstyle.nio.inner import (
+    Inner,
+    InnerSettings,
+    Learnt,
+    inner_solve,
+    learning_row,
+    learnt,
+)
 from motionstyle.nio.learning_problem import LearningProblem, target_cost
-from motionstyle.nio.ours import Learnt
 from motionstyle.nio.paper import PaperSettings
 from motionstyle.nio.style_space import StyleSpace
 from motionstyle.spacetime.style import Style
@@ -46,11 +51,10 @@ def learn_by_least_squares(
     )
     began = perf_counter()
     rows: list[dict[str, Any]] = []
-    best: tuple[float, Style] = (np.inf, learning.start)
-    about: dict[str, Any] = {}
+    best: tuple[float, Style, Inner | None] = (np.inf, learning.start, None)
 
     def error(y: Array) -> float:
-        nonlocal best, about
+        nonlocal best
         if len(rows) >= budget:
             raise _SpentError
         style = space.style(np.clip(y, low, high), learning.start)
@@ -59,11 +63,7 @@ def learn_by_least_squares(
         found = row["joint_error_deg"] ** 2
         better = found < best[0]
         if better:
-            best = (found, style)
-            about = {
-                "solver_status": inner.result.status,
-                "optimality": inner.result.optimality,
-            }
+            best = (found, style, inner)
         row |= {"iteration": len(rows), "closeness": 0.0, "gain": SIGMOID_GAIN}
         row |= {"accepted": bool(better), "objective": found, "inner_solves": len(rows) + 1}
         rows.append(row | {"seconds": perf_counter() - began})
@@ -74,7 +74,6 @@ def learn_by_least_squares(
         minimize(error, origin, method="Powell", bounds=list(zip(low, high, strict=True)))
     except _SpentError:
         log(f"{budget} inner solves: budget spent")
-    return Learnt(
-        replace(best[1], about=dict(learning.start.about) | {"recipe": "least_squares"} | about),
-        rows,
-    )
+    if best[2] is None:
+        return Learnt(best[1], rows)
+    return learnt(learning, "least_squares", best[1], best[2], rows)

@@ -29,14 +29,20 @@ from scipy.optimize import lsq_linear
 
 from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.passive import SIGMOID_GAIN
-from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
-from motionstyle.nio.inner import Inner, InnerSettings, inner_solve, learning_row
+from motionstyle.nio.derivatives import SIZE, energy_by_style, joint_response
+from motionstyle.nio.inner import (
+    Inner,
+    InnerSettings,
+    Learnt,
+    inner_solve,
+    learning_row,
+    learnt,
+)
 from motionstyle.nio.learning_problem import Cost, LearningProblem, target_cost
 from motionstyle.nio.style_space import StyleSpace
 from motionstyle.spacetime.continuation import solve_spacetime
-from motionstyle.spacetime.sensitivity import OptimumHessian
 from motionstyle.spacetime.solver_point import SolverSettings
-from motionstyle.spacetime.spacetime_problem import COUNT, Evaluator
+from motionstyle.spacetime.spacetime_problem import COUNT
 from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
@@ -56,7 +62,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class OurSettings:
-    """Settings of the learner; found on CMU 07/08 and Bandai dataset-1, then frozen.
+    """Settings of the learner, `config/nio.yaml`.
 
     Attributes
     ----------
@@ -89,14 +95,6 @@ class OurSettings:
     round_steps: int = 0
     round_gain: float = SIGMOID_GAIN
     final_steps: int = 0
-
-
-@dataclass(frozen=True)
-class Learnt:
-    """A learnt style and how it came about: one row per step of θ (`tables/nio_learning.csv`)."""
-
-    style: Style
-    rows: list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -166,19 +164,14 @@ class _Learner:
         """Return the Jacobian of the residuals by y, and of the control points, (K·35, 147)."""
         inner, chain = state.inner, self.space.chain(state.style)
         values, problem = inner.result.values, inner.problem
-        mixed = mixed_derivatives(problem, values, inner.result.coefficients)
-        hessian = OptimumHessian.at(Evaluator(problem), inner.result)
-        controls = hessian.sensitivity(*mixed).controls @ chain
-        basis = problem.basis()
-        moved = basis.evaluate(controls.reshape(basis.controls, -1))[0]
-        moved = moved.reshape(problem.frames, COUNT, SIZE)[:, JOINT_COORDINATES]
+        moved, controls = joint_response(problem, inner.result, chain)
         at_target = energy_by_style(problem, state.target.values)
         at_synth = energy_by_style(problem, values)
         total, gap = state.target.total, state.target.total - inner.cost.total
         by_style = (at_target - at_synth) / total - gap * at_target / total**2
         root = np.sqrt(self.settings.gap_weight * self._gap(inner, state.target))
         rows = [
-            self.degrees * moved.reshape(-1, SIZE),
+            self.degrees * moved,
             np.sqrt(self.settings.prior_weight) * np.eye(SIZE),
             (0.5 * self.settings.gap_weight / root * (by_style @ chain))[None],
         ]
@@ -261,12 +254,7 @@ def learn(
         found = _from_target(learner, state, final)
     record(found, final, True)
     state, trust = _stage(learner, found, final, trust, record)
-    about = dict(learning.start.about) | {
-        "recipe": "ours",
-        "solver_status": state.inner.result.status,
-        "optimality": state.inner.result.optimality,
-    }
-    return Learnt(replace(state.style, about=about), rows)
+    return learnt(learning, "ours", state.style, state.inner, rows)
 
 
 def _from_target(learner: _Learner, state: _State, stage: Stage) -> _State:

@@ -19,9 +19,15 @@ from numpy.typing import NDArray
 from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.passive import LARGEST_DAMPING, LARGEST_STIFFNESS, SIGMOID_GAIN
 from motionstyle.nio.derivatives import JOINTS, SIZE, energy_by_style
-from motionstyle.nio.inner import Inner, InnerSettings, inner_solve, learning_row
+from motionstyle.nio.inner import (
+    Inner,
+    InnerSettings,
+    Learnt,
+    inner_solve,
+    learning_row,
+    learnt,
+)
 from motionstyle.nio.learning_problem import Cost, LearningProblem, motion_cost, target_cost
-from motionstyle.nio.ours import Learnt
 from motionstyle.nio.style_space import LARGEST_SHOE_LENGTH, LARGEST_SHOE_STIFFNESS
 from motionstyle.spacetime.style import Style
 
@@ -108,16 +114,12 @@ def learn_as_paper(
             beta *= 0.25
         if found is None:
             log(f"{iteration:3d} no step lowers G + D: stopped")
+            rows[-1]["inner_solves"] = solves  # and of the trials that failed
             break
         style, inner, target = found
         longest = settings.growth * beta
         record(iteration, beta, True)
-    about = dict(learning.start.about) | {
-        "recipe": "paper",
-        "solver_status": inner.result.status,
-        "optimality": inner.result.optimality,
-    }
-    return Learnt(replace(style, about=about), rows)
+    return learnt(learning, "paper", style, inner, rows)
 
 
 def _units(scaled: bool) -> Array:

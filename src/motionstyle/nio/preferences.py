@@ -12,7 +12,7 @@ method). The true G is then found by one more inner solve.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
@@ -22,9 +22,15 @@ from scipy.optimize import minimize
 
 from motionstyle.dynamics.passive import SIGMOID_GAIN
 from motionstyle.nio.derivatives import JOINTS
-from motionstyle.nio.inner import Inner, InnerSettings, inner_solve, learning_row
+from motionstyle.nio.inner import (
+    Inner,
+    InnerSettings,
+    Learnt,
+    inner_solve,
+    learning_row,
+    learnt,
+)
 from motionstyle.nio.learning_problem import Cost, LearningProblem, target_cost
-from motionstyle.nio.ours import Learnt
 from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
@@ -144,9 +150,4 @@ def learn_preferences(
         )
         style = style.with_vector(vector)
     chosen, last = (style, inner) if best is None else (best[1], best[2])
-    about = dict(learning.start.about) | {
-        "recipe": "alpha_only",
-        "solver_status": last.result.status,
-        "optimality": last.result.optimality,
-    }
-    return Learnt(replace(chosen, about=about), rows)
+    return learnt(learning, "alpha_only", chosen, last, rows)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from motionstyle.errors import MotionStyleError, near_matches
-from motionstyle.mocap.datasets.cells import Cells, check_header, sheet_lines
+from motionstyle.mocap.datasets.cells import Cells, sheet_rows
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.synthesis_sheet import MOODS
 
@@ -72,27 +72,15 @@ def read_styles(path: str | Path, clips: Collection[str] | None = None) -> tuple
         With every problem of the sheet, one a line.
     """
     path = Path(path)
-    lines = sheet_lines(path)
-    if not lines:
-        raise MotionStyleError(f"{path}: the sheet is empty; its first line names the columns")
-    check_header(path, *lines[0], COLUMNS)
     problems: list[str] = []
     rows: list[StyleRow] = []
     first: dict[tuple[str, str], int] = {}
-    for number, line in lines[1:]:
-        if len(line) != len(COLUMNS):
-            problems.append(
-                f"{path.name} row {number}: {len(line)} cells, expected {len(COLUMNS)}"
-                " (one for each column, divided by tabs)"
-            )
-            continue
-        named = {c: cell.strip() for c, cell in zip(lines[0][1], line, strict=True)}
-        cells = Cells(path.name, number, named, problems)
+    for cells in sheet_rows(path, COLUMNS, problems):
         row = _row(cells)
         rows.append(row)
         for column, value in (("id", row.id.casefold()), ("clip", row.clip)):
-            former = first.setdefault((column, value), number)
-            if former != number and value:
+            former = first.setdefault((column, value), cells.row)
+            if former != cells.row and value:
                 cells.problem(column, f"{value!r} stands already in row {former}")
         if clips is not None and row.clip and row.clip not in clips:
             near = near_matches(row.clip, sorted(clips))

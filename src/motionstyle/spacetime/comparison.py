@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.errors import MotionStyleError
+from motionstyle.motion.difference import joint_rms_deg
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.ipopt_referee import IpoptReferee
@@ -103,9 +104,8 @@ def compare_designs(
     at = next(k for k, row in enumerate(rows) if row["E"] == best)
     for row, q in zip(rows, coordinates, strict=True):
         row["within_1_pct"] = row["status"] == "converged" and row["E"] <= (1 + SAME_BASIN) * best
-        away = (q - coordinates[at])[:, 6:]
         row["above_best_pct"] = 100 * (row["E"] / best - 1)
-        row["joint_rms_from_best_deg"] = float(np.degrees(np.sqrt((away**2).mean())))
+        row["joint_rms_from_best_deg"] = joint_rms_deg(q, coordinates[at])
     return {"rows": rows, "traces": traces}
 
 

@@ -22,7 +22,7 @@ from motionstyle.body.body import Body
 from motionstyle.body.layout import CONTACT_POINTS, NODE_INDEX
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import atomic_write
-from motionstyle.mocap.datasets.cells import Cells, check_header, sheet_lines
+from motionstyle.mocap.datasets.cells import Cells, sheet_rows
 
 Array = NDArray[np.float64]
 
@@ -182,23 +182,11 @@ def read_footprints(path: str | Path) -> tuple[Footprint, ...]:
         With every wrong cell, one a line.
     """
     path = Path(path)
-    lines = sheet_lines(path)
-    if not lines:
-        raise MotionStyleError(f"{path}: no footprints; the first line names the columns")
-    check_header(path, *lines[0], COLUMNS)
-    if len(lines) == 1:
-        raise MotionStyleError(f"{path}: no footprints under the names of the columns")
     problems: list[str] = []
     found = []
-    for number, line in lines[1:]:
-        if len(line) != len(COLUMNS):
-            problems.append(
-                f"{path.name} row {number}: {len(line)} cells, expected {len(COLUMNS)} "
-                "(one for each column, divided by tabs)"
-            )
-            continue
-        named = {c: cell.strip() for c, cell in zip(lines[0][1], line, strict=True)}
-        cells = Cells(path.name, number, named, problems)
+    for cells in sheet_rows(
+        path, COLUMNS, problems, none="no footprints under the names of the columns"
+    ):
         before = len(problems)
         values = {name: _number(cells, name) for name in COLUMNS[2:11]}
         for name in ("foot", "point"):
@@ -206,7 +194,7 @@ def read_footprints(path: str | Path) -> tuple[Footprint, ...]:
         foot, point = cells.one_of("foot", tuple(SIDES)), cells.one_of("point", tuple(GROUPS))
         slide = cells.one_of("slide", ("yes", "no")) == "yes"
         if len(problems) == before and foot and point:
-            found.append(Footprint(foot, point, **values, slide=slide, row=number))
+            found.append(Footprint(foot, point, **values, slide=slide, row=cells.row))
     if problems:
         raise MotionStyleError("\n".join(problems))
     return tuple(found)

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 from motionstyle.body.body import Body
 from motionstyle.body.layout import CONTACT_POINTS
 from motionstyle.dynamics.codegen import FrameFunction
+from motionstyle.dynamics.passive import sigmoid_slopes
+from motionstyle.dynamics.shoes import Shoes
 from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.foot_constraints import FootConstraints
@@ -173,7 +175,7 @@ class Evaluator:
         heights_of = np.zeros((frames, POINTS, POINTS, 3))
         heights_of[:, each, each] = feet.normals
         self.heights_of = heights_of.reshape(frames, POINTS, 3 * POINTS)
-        self.heel_stiffness = np.isin(each, HEELS) * problem.style.shoe_stiffness
+        self.heels = np.isin(each, HEELS)
         self.bearing = np.repeat(feet.held, 4, axis=1)
         self.scale = np.sqrt(
             np.concatenate([np.full(6, settings.root_weight), problem.style.preferences])
@@ -247,9 +249,7 @@ class Evaluator:
         """Return Q_p of eqs. (6), (7) (F, 29), and −∂Q_p/∂q, −∂²Q_p/∂q²."""
         p, gain = self.problem.style.passive, self.problem.settings.sigmoid_gain
         away = q[:, 6:] - p.rest_angle
-        turn = np.tanh(gain * away)
-        above, steep = 0.5 * (turn + 1), 0.5 * gain * (1 - turn**2)
-        bend = -2 * gain * turn * steep
+        above, steep, bend = sigmoid_slopes(away, gain)
         excess = p.stiffness_above - p.stiffness_below
         stiffness = p.stiffness_below + above * excess
         force = -stiffness * away - p.damping * qd[:, 6:]
@@ -261,20 +261,12 @@ class Evaluator:
 
         Eq. (9) without ∂h/∂q: γ(h̄−h) k (h̄−h) along the normal, at the heels.
         """
-        style, feet, gain = (
-            self.problem.style,
-            self.problem.feet,
-            self.problem.settings.shoe_gain,
-        )
+        style, feet = self.problem.style, self.problem.feet
+        shoes = Shoes(style.shoe_stiffness, style.shoe_rest_length, self.problem.settings.shoe_gain)
         height = ((points - feet.ground) * feet.normals).sum(axis=-1)
-        squeeze = style.shoe_rest_length - height
-        turn = np.tanh(gain * squeeze)
-        on, steep = 0.5 * (turn + 1), 0.5 * gain * (1 - turn**2)
-        bend = -2 * gain * turn * steep
-        heel = self.heel_stiffness
-        size = heel * on * squeeze
-        by_height = -heel * (on + steep * squeeze)
-        by_height2 = heel * (2 * steep + bend * squeeze)
+        size = self.heels * shoes.force(height)
+        by_height = self.heels * shoes.force_by_height(height)
+        by_height2 = self.heels * shoes.force_by_height_twice(height)
         return size[..., None] * feet.normals, by_height, by_height2
 
     def tracking_pull(self, coordinates: Array) -> Array:

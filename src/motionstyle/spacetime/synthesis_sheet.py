@@ -14,7 +14,7 @@ from pathlib import Path
 
 from motionstyle.body.layout import COORDINATES, JOINT_COORDINATES
 from motionstyle.errors import MotionStyleError, near_matches
-from motionstyle.mocap.datasets.cells import Cells, check_header, finite, sheet_lines
+from motionstyle.mocap.datasets.cells import Cells, finite, sheet_rows
 from motionstyle.spacetime.edits import SUITCASE, Edits
 
 COLUMNS = (
@@ -148,27 +148,15 @@ def read_syntheses(
         With every problem of the sheet, one a line.
     """
     path = Path(path)
-    lines = sheet_lines(path)
-    if not lines:
-        raise MotionStyleError(f"{path}: the sheet is empty; its first line names the columns")
-    check_header(path, *lines[0], COLUMNS)
     problems: list[str] = []
     rows: list[SynthesisRow] = []
     seen: dict[str, int] = {}
-    for number, line in lines[1:]:
-        if len(line) != len(COLUMNS):
-            problems.append(
-                f"{path.name} row {number}: {len(line)} cells, expected {len(COLUMNS)}"
-                " (one for each column, divided by tabs)"
-            )
-            continue
-        named = {c: cell.strip() for c, cell in zip(lines[0][1], line, strict=True)}
-        cells = Cells(path.name, number, named, problems)
+    for cells in sheet_rows(path, COLUMNS, problems):
         row = _row(cells, path.parent)
         if clips is not None:
             _check_clips(cells, row, sorted(clips))
-        former = seen.setdefault(row.id.casefold(), number)
-        if former != number and row.id:
+        former = seen.setdefault(row.id.casefold(), cells.row)
+        if former != cells.row and row.id:
             cells.problem("id", f"{row.id!r} is already the id of row {former}")
         rows.append(row)
     if problems:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from motionstyle.errors import MotionStyleError, near_matches
+from motionstyle.nio.inner import Learnt
 from motionstyle.nio.learning_problem import LearningProblem
 from motionstyle.nio.least_squares import learn_by_least_squares
-from motionstyle.nio.ours import Learnt, learn
+from motionstyle.nio.ours import learn
 from motionstyle.nio.paper import learn_as_paper
 from motionstyle.nio.preferences import PreferenceSettings, learn_preferences
 from motionstyle.nio.settings import our_settings, paper_settings

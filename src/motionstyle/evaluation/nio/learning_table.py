@@ -25,7 +25,7 @@ RESYNTHESIS_COLUMNS = (
     *("joint_rms_deg", "joint_error_middle_deg", "captured_error_deg", "root_path_rms_cm"),
     *("ground_reaction_rms_pctbw", "high_frequency_rms_deg", "target_high_frequency_rms_deg"),
     *("E_target", "E_synth", "total", "G", "G_over_E_target", "root_share_of_E_pct"),
-    *("foot_error_mm", "effective_joints_in_alpha", "passive_over_muscle", "above_best_pct"),
+    *("foot_error_mm", "effective_joints_in_alpha", "synth_passive_over_muscle", "above_best_pct"),
     *("from_first_start_deg", "beats_paper", "optimality", "iterations", "solver_seconds"),
     *("projection_status", "projection_angle_rms_deg", "projection_root_n", "reason"),
 )
@@ -82,27 +82,30 @@ def learning_rows(
             taken[-1]["last_step"] = True
         final = finals.get((one["cells"]["style"], one["algorithm"]))
         if final is not None and final["status"] != "failed":
-            rows.append({**common, **_final(one["rows"][-1], final["rows"])})
+            rows.append({**common, **_final(one["rows"], final["rows"])})
     return rows
 
 
-def _final(step: Mapping[str, Any], judged: list[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the last row of a style: the deepest converged optimum of its final solves."""
+def _final(steps: list[Mapping[str, Any]], judged: list[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the last row of a style: the deepest converged optimum of its final solves.
+
+    What X_T alone decides is that of the last step taken.
+    """
+    taken = [step for step in steps if step["accepted"]] or steps
     done = [row for row in judged if row["status"] == "converged" and row["ends"] == "free"]
     deepest = min(done or judged, key=lambda row: row["total"])
     return {
         **{k: deepest[k] for k in ("G", "G_over_E_target", "E_target", "E_synth", "status")},
         **{k: deepest[k] for k in ("optimality", "effective_joints_in_alpha")},
         "inner": "converged" if done else "truncated",
-        "iteration": step["iteration"],
+        "iteration": steps[-1]["iteration"],
         "last": True,
         "accepted": True,
         "joint_error_deg": deepest["joint_rms_deg"],
         "inner_iterations": deepest["iterations"],
-        "passive_over_muscle": deepest["passive_over_muscle"],
-        "alpha_on_idle_joints": step["alpha_on_idle_joints"],
+        **{k: taken[-1][k] for k in ("passive_over_muscle", "alpha_on_idle_joints")},
         "closeness": 0.0,
-        "seconds": step["seconds"],
+        "seconds": steps[-1]["seconds"],
     }
 
 

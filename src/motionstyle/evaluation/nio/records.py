@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from motionstyle.dynamics.codegen import FrameFunction, load_functions
-from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import second_order_functions
+from motionstyle.dynamics.codegen import FrameFunction
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.kinds import KINDS
 from motionstyle.evaluation.nio.learning_table import style_cells
@@ -19,12 +17,6 @@ from motionstyle.tables import plain
 
 # Farther than this from its fit a motion is another one: it fell, or a foot let go.
 FARTHEST_MM, FARTHEST_DEG = 30.0, 3.0
-
-
-def load_functions_of(code: str | Path, second_order: str | Path) -> dict[str, FrameFunction]:
-    """Return the compiled functions that learning needs."""
-    functions = load_functions(dynamics_functions, Path(code))
-    return functions | load_functions(second_order_functions, Path(second_order))
 
 
 def load_learning(

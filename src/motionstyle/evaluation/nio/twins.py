@@ -18,19 +18,18 @@ from numpy.typing import NDArray
 from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.codegen import FrameFunction
 from motionstyle.errors import MotionStyleError
-from motionstyle.evaluation.spacetime.twins import joint_error_deg
+from motionstyle.motion.difference import joint_rms_deg
 from motionstyle.motion.motion import Motion
-from motionstyle.nio.derivatives import SIZE, mixed_derivatives
+from motionstyle.nio.derivatives import SIZE, joint_response
+from motionstyle.nio.inner import Learnt
 from motionstyle.nio.judging import judge
 from motionstyle.nio.learning_problem import LearningProblem, learning_problem, motion_cost
-from motionstyle.nio.ours import Learnt
 from motionstyle.nio.style_space import StyleSpace
 from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.edits import Edits
 from motionstyle.spacetime.made_styles import random_style
-from motionstyle.spacetime.sensitivity import OptimumHessian
 from motionstyle.spacetime.solver_point import InteriorPointResult, SolverSettings
-from motionstyle.spacetime.spacetime_problem import COUNT, Evaluator, SpacetimeProblem
+from motionstyle.spacetime.spacetime_problem import SpacetimeProblem
 from motionstyle.spacetime.starts import perturbed
 from motionstyle.spacetime.style import Style, initial_style
 from motionstyle.spacetime.synthesis import synthesise
@@ -120,12 +119,7 @@ def singular_values(
 ) -> Array:
     """Return the singular values of ∂(joint angles)/∂y at an optimum, degrees rms per unit."""
     space = StyleSpace.of(learning.ranges, 0.01, 29.0)
-    hessian = OptimumHessian.at(Evaluator(problem), found)
-    mixed = mixed_derivatives(problem, found.values, found.coefficients)
-    controls = hessian.sensitivity(*mixed).controls @ space.chain(problem.style)
-    basis = problem.basis()
-    moved = basis.evaluate(controls.reshape(basis.controls, -1))[0]
-    joints = moved.reshape(problem.frames, COUNT, SIZE)[:, JOINT_COORDINATES].reshape(-1, SIZE)
+    joints, _controls = joint_response(problem, found, space.chain(problem.style))
     return np.linalg.svd(np.degrees(joints) / np.sqrt(len(joints)), compute_uv=False)
 
 
@@ -162,7 +156,7 @@ def twin_row(
         ours, our_status = new_motion(task, twin.learning.target, learnt.style, functions)
         done = true_status == our_status == "converged"
         if done and true is not None and ours is not None:
-            errors.append(joint_error_deg(ours, true))
+            errors.append(joint_rms_deg(ours.coordinates, true.coordinates))
         log(f"{task}: {true_status} and {our_status}, {errors[-1] if done else None}")
     logs = [np.log(style.preferences) for style in (twin.truth, learnt.style)]
     return {

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.body.layout import JOINT_COORDINATES
+from motionstyle.motion.difference import joint_rms_deg
 from motionstyle.nio.learning_problem import LearningProblem
 from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.diagnosis import checked_solve
@@ -138,7 +138,6 @@ def solve_choice(
     # λ of the least objective, so that E(X_T) and E(X_S) are the same function of the motion.
     end = found.point.controls
     values = evaluator.values(end, best_coefficients(evaluator, end))
-    away = (values.coordinates - start.coordinates)[:, JOINT_COORDINATES]
     gap = start.energy - values.energy
     row |= {
         "E_optimum": values.energy,
@@ -148,6 +147,6 @@ def solve_choice(
         "foot_error_mm": 1000
         * float(np.abs(values.foot_residuals).max())
         / np.sqrt(problem.settings.foot_weight),
-        "joint_rms_deg": float(np.degrees(np.sqrt((away**2).mean()))),
+        "joint_rms_deg": joint_rms_deg(values.coordinates, start.coordinates),
     }
     return Solved(row, problem, target, end)

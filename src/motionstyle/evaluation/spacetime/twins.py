@@ -12,11 +12,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.codegen import FrameFunction
 from motionstyle.errors import MotionStyleError
+from motionstyle.motion.difference import joint_rms_deg
 from motionstyle.motion.motion import Motion
 from motionstyle.spacetime.edits import into_ranges
 from motionstyle.spacetime.solver_point import SolverSettings
@@ -49,12 +47,6 @@ def start_near(target: Motion, plan: Plan, name: str) -> Motion:
     else:
         raise MotionStyleError(f"start '{name}' is unknown; use paper or perturbed_1, _2, …")
     return replace(start, coordinates=into_ranges(start.coordinates, plan.ranges))
-
-
-def joint_error_deg(motion: Motion, target: Motion) -> float:
-    """Return the rms difference of all 29 joint coordinates over all frames, deg."""
-    away = (motion.coordinates - target.coordinates)[:, JOINT_COORDINATES]
-    return float(np.degrees(np.sqrt((away**2).mean())))
 
 
 def twin_rows(
@@ -90,12 +82,16 @@ def twin_rows(
                 "problem": row.id,
                 "seed": seed,
                 "start": name,
-                "start_rms_deg": joint_error_deg(start, target),
+                "start_rms_deg": joint_rms_deg(start.coordinates, target.coordinates),
                 "target_status": made.report["status"],
                 "target_E": made.report["E"],
                 **{k: found.report.get(k) for k in ("status", "E", "optimality", "iterations")},
                 "seconds": found.report["seconds"],
-                "joint_rms_deg": joint_error_deg(found.motion, target) if found.motion else None,
+                "joint_rms_deg": (
+                    joint_rms_deg(found.motion.coordinates, target.coordinates)
+                    if found.motion
+                    else None
+                ),
             }
         )
         log(f"{row.id} θ*{seed} from {name}: {rows[-1]['status']}, {rows[-1]['joint_rms_deg']}")

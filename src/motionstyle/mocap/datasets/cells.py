@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from motionstyle.errors import MotionStyleError, near_matches
@@ -105,7 +105,42 @@ def finite(value: str) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def sheet_lines(path: Path) -> list[tuple[int, list[str]]]:
+def sheet_rows(
+    path: Path, columns: Sequence[str], problems: list[str], *, none: str | None = None
+) -> Iterator[Cells]:
+    """Yield the cells of every row under the header; empty lines and comments are passed over.
+
+    Rows are counted as an editor counts lines. Rows with a wrong number of cells are noted in
+    `problems` and left out.
+
+    Parameters
+    ----------
+    none : what to say of a sheet without rows, if that is a fault.
+
+    Raises
+    ------
+    MotionStyleError
+        If the file cannot be read, its header is not the columns, or it must have rows.
+    """
+    lines = _lines(path)
+    if not lines:
+        raise MotionStyleError(f"{path}: the sheet is empty; its first line names the columns")
+    header = lines[0][1]
+    _check_header(path, *lines[0], columns)
+    if none is not None and len(lines) == 1:
+        raise MotionStyleError(f"{path}: {none}")
+    for number, line in lines[1:]:
+        if len(line) != len(header):
+            problems.append(
+                f"{path.name} row {number}: {len(line)} cells, expected {len(header)}"
+                " (one for each column, divided by tabs)"
+            )
+            continue
+        named = {column: cell.strip() for column, cell in zip(header, line, strict=True)}
+        yield Cells(path.name, number, named, problems)
+
+
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Return (line number, cells) of every line that is neither empty nor a comment."""
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -126,7 +161,7 @@ def sheet_lines(path: Path) -> list[tuple[int, list[str]]]:
     return found
 
 
-def check_header(path: Path, number: int, header: list[str], columns: Sequence[str]) -> None:
+def _check_header(path: Path, number: int, header: list[str], columns: Sequence[str]) -> None:
     """Refuse a header with unknown, doubled or missing columns."""
     unknown = [name for name in header if name not in columns]
     missing = [name for name in columns if name not in header]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from motionstyle.errors import MotionStyleError, near_matches
-from motionstyle.mocap.datasets.cells import Cells, check_header, finite, sheet_lines
+from motionstyle.mocap.datasets.cells import Cells, finite, sheet_rows
 from motionstyle.mocap.datasets.doors import DatasetFile, unknown_dataset_file
 
 Datasets = Mapping[tuple[str, str], DatasetFile]
@@ -130,25 +130,12 @@ def read_sheet(
         With every problem of the sheet, one a line.
     """
     path = Path(path)
-    lines = sheet_lines(path)
-    if not lines:
-        raise MotionStyleError(f"{path}: the sheet is empty; its first line names the columns")
-    check_header(path, *lines[0], COLUMNS)
-    if len(lines) == 1:
-        raise MotionStyleError(f"{path}: the sheet has no rows under its column names")
-    header = lines[0][1]
     problems: list[str] = []
     rows: list[ClipRow] = []
     seen: dict[str, ClipRow] = {}
-    for number, line in lines[1:]:
-        if len(line) != len(header):
-            problems.append(
-                f"{path.name} row {number}: {len(line)} cells, expected {len(header)}"
-                " (one for each column, divided by tabs)"
-            )
-            continue
-        named = {column: cell.strip() for column, cell in zip(header, line, strict=True)}
-        cells = Cells(path.name, number, named, problems)
+    for cells in sheet_rows(
+        path, COLUMNS, problems, none="the sheet has no rows under its column names"
+    ):
         row = _row(cells, path.parent)
         _check_row(cells, row, skeletons)
         _check_files(cells, row, datasets, embedded_files)
