@@ -126,11 +126,12 @@ def test_ledger_before_any_number(ledger, tmp_path):
 def test_nio_figure_5_follows_its_three_numbers(ledger, tmp_path):
     (tmp_path / "tables").mkdir()
     claim = [c for c in ledger if c.id == "nio-F5"]
-    head = "algorithm,inner,action,mood,iteration,last_step,G,G_over_E_target,data\n"
-    row = "paper,truncated,walk,neutral,{},{},{},{},captured\n"
+    head = "algorithm,inner,action,mood,iteration,step_10,last_step,G,G_over_E_target,data\n"
+    row = "paper,truncated,walk,neutral,{},{},{},{},{},captured\n"
 
     def verdict(last_gap, tenth):
-        rows = [(0, "", 6000, 0.8), (10, "", tenth, 0.1), (42, "yes", 474.05, last_gap)]
+        rows = [(0, "", "", 6000, 0.8), (10, "yes", "", tenth, 0.1)]
+        rows.append((42, "", "yes", 474.05, last_gap))
         text = head + "".join(row.format(*values) for values in rows)
         (tmp_path / "tables" / "nio_learning.csv").write_text(text)
         result = evaluate_claims(claim, tmp_path)[0]

@@ -123,6 +123,8 @@ def test_learning_and_judging_become_tables(tmp_path):
     rows = learning_rows([record(cells, "paper", steps)], judged, "test")
     assert all(set(one) <= set(LEARNING_COLUMNS) for one in rows)
     assert [one.get("not_rising") for one in rows] == [None, True, False, None]
+    assert [one.get("last_step") for one in rows] == [None, None, True, None]
+    assert [one.get("step_10") for one in rows] == [None, None, True, None]  # it stopped before
     assert rows[-1]["last"]
     assert rows[-1]["inner"] == "converged"
     assert rows[-1]["joint_error_deg"] == 9.0  # of the deepest optimum, not of the first start
@@ -131,6 +133,8 @@ def test_learning_and_judging_become_tables(tmp_path):
     assert [one.get("beats_paper") for one in found] == [None, None, True, None]
     judged[1]["rows"][0]["status"] = "iteration limit"
     assert resynthesis_rows(judged, "test")[2]["beats_paper"] is False
+    judged[0]["rows"][0]["status"] = "iteration limit"
+    assert resynthesis_rows(judged, "test")[2].get("beats_paper") is None
 
 
 def test_a_refused_trial_at_the_end_tells_nothing_of_the_style(tmp_path):

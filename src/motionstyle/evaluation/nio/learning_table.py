@@ -13,7 +13,7 @@ from motionstyle.nio.styles_sheet import StyleRow
 STYLE_COLUMNS = ("style", "clip", "data", "set", "action", "mood")
 LEARNING_COLUMNS = (
     *("config", *STYLE_COLUMNS, "algorithm", "inner", "iteration", "last", "last_step"),
-    "accepted",
+    *("step_10", "accepted"),
     *("G", "G_over_E_target", "E_target", "E_synth", "muscle_target", "root_target"),
     *("muscle_synth", "root_synth", "muscle_gap_over_E_target", "root_gap_over_E_target"),
     *("objective", "not_rising", "joint_error_deg", "status", "optimality", "inner_iterations"),
@@ -26,10 +26,18 @@ RESYNTHESIS_COLUMNS = (
     *("ground_reaction_rms_pctbw", "high_frequency_rms_deg", "target_high_frequency_rms_deg"),
     *("E_target", "E_synth", "total", "G", "G_over_E_target", "root_share_of_E_pct"),
     *("foot_error_mm", "effective_joints_in_alpha", "synth_passive_over_muscle", "above_best_pct"),
-    *("from_first_start_deg", "beats_paper", "optimality", "iterations", "solver_seconds"),
+    *(
+        "from_first_start_deg",
+        "paper_status",
+        "beats_paper",
+        "optimality",
+        "iterations",
+        "solver_seconds",
+    ),
     *("projection_status", "projection_angle_rms_deg", "projection_root_n", "reason"),
 )
 _RISE = 1e-9  # relative: rounding
+EARLY = 10  # steps; a learner that stopped before counts where it stopped
 
 
 def style_cells(row: StyleRow) -> dict[str, Any]:
@@ -77,9 +85,11 @@ def learning_rows(
                     row["not_rising"] = step["objective"] <= before * (1 + _RISE)
                 before = step["objective"]
             rows.append(row)
-        taken = [row for row in rows[-len(one["rows"]) :] if row["accepted"]]
+        taken = [row for row in rows[len(rows) - len(one["rows"]) :] if row["accepted"]]
         if taken:
             taken[-1]["last_step"] = True
+            early = [row for row in taken if row["iteration"] <= EARLY]
+            early[-1]["step_10"] = True
         final = finals.get((one["cells"]["style"], one["algorithm"]))
         if final is not None and final["status"] != "failed":
             rows.append({**common, **_final(one["rows"], final["rows"])})
@@ -125,7 +135,9 @@ def resynthesis_rows(judged: Iterable[Mapping[str, Any]], config: str) -> list[d
     paper = {row["style"]: row for row in rows if _first(row, "paper")}
     for row in rows:
         other = paper.get(row["style"])
-        if _first(row, "ours") and other is not None and other["status"] == "converged":
+        if _first(row, "ours") and other is not None:
+            row["paper_status"] = other["status"]
+        if row.get("paper_status") == "converged":
             nearer = row.get("joint_rms_deg", float("inf")) < other["joint_rms_deg"]
             row["beats_paper"] = row["status"] == "converged" and nearer
     return rows
