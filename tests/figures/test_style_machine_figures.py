@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from motionstyle.evaluation.style_machines.checks import prior_ellipses
+from motionstyle.figures import style_machine_models as models
 from motionstyle.figures import style_machines as figures
 from motionstyle.figures.style import save
 
@@ -25,10 +26,10 @@ def texts(figure):
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: figures.models_figure({}, EMPTY),
+        lambda: models.models_figure({}, EMPTY),
         lambda: figures.dof_figure(EMPTY),
-        lambda: figures.dance_figure({}, "", None),
-        lambda: figures.annealing_figure({}),
+        lambda: models.dance_figure({}, "", None),
+        lambda: models.annealing_figure({}),
         lambda: figures.axes_figure(EMPTY, {}),
         lambda: figures.analogies_figure(EMPTY),
         lambda: figures.held_out_figure(EMPTY),
@@ -38,7 +39,7 @@ def texts(figure):
     ],
 )
 def test_without_motions_a_figure_says_so(make):
-    assert figures.NO_DATA in texts(make())
+    assert models.NO_DATA in texts(make())
 
 
 def test_explained_variance_shows_the_paper_and_the_median_draw(tmp_path):
@@ -81,15 +82,15 @@ def test_dances_show_the_four_numbers_of_the_paper():
         "m_occupancy_1": np.eye(2)[[1, 1, 0]],
     }
     row = {"states_start": 3, "states_end": 2, "parameters": 40, "frames": 6, "rate_hz": 60.0}
-    words = texts(figures.dance_figure(arrays, "m", row))
+    words = texts(models.dance_figure(arrays, "m", row))
     assert "3 to 2 states, 40 parameters, 6 frames" in words
     assert "occupancy of b" in words
 
 
 def test_priors_and_graphs_need_no_motion(tmp_path):
     arrays = {f"priors_{k}": v for k, v in prior_ellipses().items()}
-    assert "Z (entropy: shrinks)" in texts(figures.priors_figure(arrays))
-    assert "stylistic model" in texts(figures.graphs_figure())
+    assert "Z (entropy: shrinks)" in texts(models.priors_figure(arrays))
+    assert "stylistic model" in texts(models.graphs_figure())
 
 
 def test_known_models_are_shown_by_noise():

@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from motionstyle.evaluation.style_machines.store import load_arrays
+from motionstyle.figures import style_machine_models as model_figures
 from motionstyle.figures import style_machines as figures
 from motionstyle.figures.style import save
 from motionstyle.jobs import job
@@ -18,12 +19,12 @@ with job(snakemake.log[0]):
     numbers, models = tables["shmm_figure_checks"], tables["dance_model"]
     first = models.iloc[0].to_dict() if len(models) else None
     made = {
-        "shmm_models": figures.models_figure(checks, numbers),
-        "shmm_priors": figures.priors_figure(checks),
+        "shmm_models": model_figures.models_figure(checks, numbers),
+        "shmm_priors": model_figures.priors_figure(checks),
         "shmm_dof": figures.dof_figure(tables["explained_variance"]),
-        "shmm_dance": figures.dance_figure(dances, first["model"] if first else "", first),
-        "shmm_graphs": figures.graphs_figure(),
-        "shmm_annealing": figures.annealing_figure(checks),
+        "shmm_dance": model_figures.dance_figure(dances, first["model"] if first else "", first),
+        "shmm_graphs": model_figures.graphs_figure(),
+        "shmm_annealing": model_figures.annealing_figure(checks),
         "shmm_axes": figures.axes_figure(tables["style_dof"], gaits),
         "shmm_analogies": figures.analogies_figure(tables["analogies"]),
         "shmm_held_out": figures.held_out_figure(tables["held_out"]),
