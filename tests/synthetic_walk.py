@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from motionstyle.body.body import BodyGeometry, build_body
@@ -14,6 +16,7 @@ from motionstyle.body.layout import (
 )
 from motionstyle.body.rotations import exponential, logarithm
 from motionstyle.motion.motion import Motion
+from motionstyle.motion.resample import resample
 
 RATE, STRIDE, STANCE = 100.0, 100, 60  # Hz, frames, frames
 STEP, WIDTH, THIGH, SHANK, ANKLE = 0.7, 0.10, 0.43, 0.42, 0.08  # m
@@ -91,3 +94,12 @@ def make_walk(frames: int = 420, heading: float = 0.0, **provenance: object) -> 
         observed=np.ones(len(COORDINATES), dtype=bool),
         provenance=known | provenance,
     )
+
+
+def loaded_walk(first: int, last: int) -> Motion:
+    """Return frames first to last (included) of the walk at 30 Hz, contacts bearing its weight."""
+    motion = resample(make_walk(), 30.0).window(first, last)
+    held = motion.contacts.sum(axis=1)
+    forces = np.zeros((motion.frames, 8, 3))
+    forces[..., 1] = motion.contacts * (motion.body.mass * 9.81 / np.maximum(held, 1))[:, None]
+    return replace(motion, contact_forces=forces)

@@ -31,7 +31,6 @@ from motionstyle.evaluation.spacetime.landscape import landscape
 from motionstyle.evaluation.spacetime.twins import TEST, TEST_PAPER, start_near, twin_rows
 from motionstyle.figures.landscape import landscape_figure
 from motionstyle.files import write_json
-from motionstyle.motion.resample import resample
 from motionstyle.nio.learning_problem import LearningProblem, Projection
 from motionstyle.spacetime.edits import Edits, edit_ranges
 from motionstyle.spacetime.footprint_constraints import captured_constraints
@@ -42,7 +41,7 @@ from motionstyle.spacetime.spacetime_problem import Evaluator, SpacetimeSettings
 from motionstyle.spacetime.synthesis import initial_style_of
 from motionstyle.spacetime.synthesis_plan import make_plan, planned_footprints
 from motionstyle.spacetime.synthesis_sheet import FootprintSource, SynthesisRow
-from synthetic_walk import make_walk
+from synthetic_walk import loaded_walk
 
 ROW = SynthesisRow(
     "made", None, "same_footprints", "walk", "twin", "other", FootprintSource(), Edits(),
@@ -58,12 +57,7 @@ def quiet(_text):
 @pytest.fixture(scope="module")
 def stretch():
     """A made-up walk at 30 Hz whose contacts carry its weight, 1.4 s of it."""
-    motion = resample(make_walk(), 30.0).window(10, 52)
-    held = motion.contacts.sum(axis=1)
-    forces = np.zeros((motion.frames, 8, 3))
-    weight = motion.body.mass * 9.81
-    forces[..., 1] = motion.contacts * (weight / np.maximum(held, 1))[:, None]
-    return replace(motion, contact_forces=forces)
+    return loaded_walk(10, 52)
 
 
 @pytest.fixture(scope="module")

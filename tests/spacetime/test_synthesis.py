@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 from motionstyle.body.kinematics import centre_of_mass
-from motionstyle.dynamics.codegen import load_functions
-from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import second_order_functions
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import read_json, write_json
-from motionstyle.motion.resample import resample
 from motionstyle.spacetime.continuation import STAGES
 from motionstyle.spacetime.edits import Edits
 from motionstyle.spacetime.solver_point import SolverSettings
@@ -26,7 +22,7 @@ from motionstyle.spacetime.synthesis import (
 )
 from motionstyle.spacetime.synthesis_plan import make_plan, planned_footprints
 from motionstyle.spacetime.synthesis_sheet import FootprintSource, SynthesisRow
-from synthetic_walk import make_walk
+from synthetic_walk import loaded_walk
 
 
 def row_of(**edits):
@@ -37,19 +33,14 @@ def row_of(**edits):
 
 
 @pytest.fixture(scope="module")
-def functions():
-    return load_functions(dynamics_functions, None) | load_functions(second_order_functions, None)
+def functions(all_functions):
+    return all_functions
 
 
 @pytest.fixture(scope="module")
 def walk():
     """A made-up walk, half a second of it, whose contacts carry its weight."""
-    motion = resample(make_walk(), 30.0).window(20, 36)
-    held = motion.contacts.sum(axis=1)
-    forces = np.zeros((motion.frames, 8, 3))
-    weight = motion.body.mass * 9.81
-    forces[..., 1] = motion.contacts * (weight / np.maximum(held, 1))[:, None]
-    return replace(motion, contact_forces=forces)
+    return loaded_walk(20, 36)
 
 
 def test_the_initial_style_is_that_of_the_specification(walk, functions):
