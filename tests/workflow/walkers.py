@@ -411,7 +411,13 @@ class Project:
 
     def start(self, *arguments: str, **config: object) -> subprocess.Popen[str]:
         """Start Snakemake in a process group of its own, its output in `started.txt`."""
-        with (self.folder / "started.txt").open("w", encoding="utf-8") as output:
+        # A suite in the background may be deaf to Ctrl-C; what it starts would be, too.
+        former = signal.signal(signal.SIGINT, signal.default_int_handler)
+        with (
+            (self.folder / "started.txt").open("w", encoding="utf-8") as output,
+            contextlib.ExitStack() as stack,
+        ):
+            stack.callback(signal.signal, signal.SIGINT, former)
             return subprocess.Popen(
                 self.command(*arguments, **config),
                 cwd=self.code,
