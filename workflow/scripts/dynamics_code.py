@@ -4,13 +4,11 @@ from pathlib import Path
 
 from motionstyle.dynamics.codegen import compile_library
 from motionstyle.dynamics.functions import dynamics_functions
-from motionstyle.dynamics.second_order import SECOND_ORDER_FLAGS, second_order_functions
+from motionstyle.dynamics.second_order import second_order_functions
 from motionstyle.jobs import job
 from motionstyle.mocap.datasets.doors import cache_folder
 
 with job(snakemake.log[0]):
     output, cache = snakemake.output, Path(cache_folder())
     compile_library(dynamics_functions(), Path(output.library), cache, print)
-    compile_library(
-        second_order_functions(), Path(output.second_order), cache, print, SECOND_ORDER_FLAGS
-    )
+    compile_library(second_order_functions(), Path(output.second_order), cache, print)

@@ -2,7 +2,7 @@
 
 The compiled library is kept in the user's cache under a digest of the generated code, the
 compiler and its flags, so that it is built once a machine. Each function can be called on many
-frames at once: a C loop walks the frames with one stride per argument.
+frames: a C loop takes as many at once as the processor's vectors hold (`dynamics.lanes`).
 """
 
 from __future__ import annotations
@@ -21,25 +21,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from motionstyle.dynamics.lanes import in_lanes
 from motionstyle.errors import MotionStyleError
 from motionstyle.files import atomic_write, read_json, write_json
 
 Array = NDArray[np.float64]
-FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fPIC", "-shared")
-_DRIVER = """
-#include <stddef.h>
-int {name}_frames(ptrdiff_t count, const double** arg, const ptrdiff_t* arg_step, double** res,
-    const ptrdiff_t* res_step, casadi_int* iw, double* w) {{
-  const double* a[{n_in}]; double* r[{n_out}];
-  for (ptrdiff_t t = 0; t < count; ++t) {{
-    for (int i = 0; i < {n_in}; ++i) a[i] = arg[i] + t * arg_step[i];
-    for (int i = 0; i < {n_out}; ++i) r[i] = res[i] ? res[i] + t * res_step[i] : 0;
-    int flag = {name}(a, r, iw, w, 0);
-    if (flag) return flag;
-  }}
-  return 0;
-}}
-"""
+# Higher levels make the compiler take minutes; what counts is that eight frames go at once.
+FLAGS = ("-O1", "-march=native", "-fno-math-errno", "-Wno-psabi", "-fPIC", "-shared")
 
 
 def find_compiler() -> str | None:
@@ -49,15 +37,14 @@ def find_compiler() -> str | None:
 
 
 def generate_source(functions: Sequence[ca.Function]) -> str:
-    """Return one C file with all functions and a loop over frames for each."""
+    """Return one C file with all functions and a loop over frames for each, lanes at a time."""
     with tempfile.TemporaryDirectory() as folder:
         generator = ca.CodeGenerator("functions.c", {"with_header": False})
         for function in functions:
             generator.add(function)
         generator.generate(folder + os.sep)
         source = (Path(folder) / "functions.c").read_text(encoding="utf-8")
-    drivers = [_DRIVER.format(name=f.name(), n_in=f.n_in(), n_out=f.n_out()) for f in functions]
-    return source + "".join(drivers)
+    return in_lanes(source, [function.name() for function in functions])
 
 
 def compile_library(
@@ -65,7 +52,6 @@ def compile_library(
     destination: Path,
     cache: Path,
     log: Callable[[str], None],
-    flags: Sequence[str] = FLAGS,
 ) -> None:
     """Write `destination`, a JSON file that says where the compiled functions are, if anywhere.
 
@@ -73,7 +59,6 @@ def compile_library(
     ----------
     functions : to be compiled. cache : folder that keeps libraries by digest.
     log : told whether a library was found, built, or is done without.
-    flags : of the compiler.
 
     Raises
     ------
@@ -90,17 +75,17 @@ def compile_library(
         [compiler, "-march=native", "-Q", "--help=target", "--version"],
         capture_output=True, text=True, check=False,
     ).stdout  # fmt: skip
-    digest = sha256("\0".join([source, version, *flags]).encode()).hexdigest()
+    digest = sha256("\0".join([source, version, *FLAGS]).encode()).hexdigest()
     library = cache / "code" / f"{digest[:32]}.so"
     if library.exists():
         log(f"compiled before: {library.name}")
     else:
-        log(f"compiling {len(source) / 1e6:.1f} MB of C with {compiler} {' '.join(flags)}")
+        log(f"compiling {len(source) / 1e6:.1f} MB of C with {compiler} {' '.join(FLAGS)}")
         with tempfile.TemporaryDirectory() as folder:
             file, built = Path(folder) / "functions.c", Path(folder) / "functions.so"
             file.write_text(source, encoding="utf-8")
             done = subprocess.run(
-                [compiler, *flags, str(file), "-o", str(built), "-lm"],
+                [compiler, *FLAGS, str(file), "-o", str(built), "-lm"],
                 capture_output=True, text=True, check=False,
             )  # fmt: skip
             if done.returncode:
@@ -120,7 +105,7 @@ def compile_library(
 
 @dataclass(frozen=True)
 class Signature:
-    """What a caller must know of a function: sizes of its arguments, results and work space.
+    """What a caller must know of a function: sizes of its arguments and results.
 
     inputs : nonzeros of each argument. rows, columns : of the nonzeros of each result.
     """
@@ -129,8 +114,6 @@ class Signature:
     inputs: list[int]
     rows: list[list[int]]
     columns: list[list[int]]
-    integers: int
-    reals: int
 
     @staticmethod
     def of(function: ca.Function) -> Signature:
@@ -141,8 +124,6 @@ class Signature:
             [function.nnz_in(i) for i in range(function.n_in())],
             [list(rows) for rows, _columns in triplets],
             [list(columns) for _rows, columns in triplets],
-            max(1, function.sz_iw()),
-            max(1, function.sz_w()),
         )
 
 
@@ -150,12 +131,13 @@ class Signature:
 class FrameFunction:
     """A function of one frame that is called on many; arrays come back as (F, nonzeros).
 
-    loop : the compiled loop over frames, or None. function : for the virtual machine, where
-    there is no loop.
+    loop : the compiled loop over frames, or None. lanes : frames it takes at once. function : for
+    the virtual machine, where there is no loop.
     """
 
     signature: Signature
     loop: Callable[..., int] | None
+    lanes: int = 1
     function: ca.Function | None = None
 
     @property
@@ -185,23 +167,25 @@ class FrameFunction:
 
     def _run(self, arrays: list[Array], results: list[Array], frames: int) -> None:
         def pointers(items: list[Array]) -> ctypes.Array:
-            kind = ctypes.c_void_p * len(items)
-            return kind(*(item.ctypes.data for item in items))
+            return (ctypes.c_void_p * len(items))(*(item.ctypes.data for item in items))
 
-        def steps(items: list[Array]) -> ctypes.Array:
-            kind = ctypes.c_ssize_t * len(items)
-            return kind(*(item.shape[1] if item.ndim == 2 else 0 for item in items))
+        def sizes(numbers: list[int]) -> ctypes.Array:
+            return (ctypes.c_ssize_t * len(numbers))(*numbers)
 
-        integers = np.zeros(self.signature.integers, dtype=np.int64)
-        reals = np.zeros(self.signature.reals)
+        # What the lanes read and write: one vector a number, each argument and result in a row.
+        wide = [*self.signature.inputs, *(len(rows) for rows in self.signature.rows)]
+        bytes_each = 8 * self.lanes
+        space = np.zeros(sum(wide) * self.lanes + self.lanes)
+        first = -(-space.ctypes.data // bytes_each) * bytes_each
+        ends = np.cumsum([0, *wide[:-1]])
         flag = self.loop(
             ctypes.c_ssize_t(frames),
             pointers(arrays),
-            steps(arrays),
+            sizes([item.shape[1] if item.ndim == 2 else 0 for item in arrays]),
+            sizes(wide[: len(arrays)]),
             pointers(results),
-            steps(results),
-            ctypes.c_void_p(integers.ctypes.data),
-            ctypes.c_void_p(reals.ctypes.data),
+            sizes(wide[len(arrays) :]),
+            (ctypes.c_void_p * len(wide))(*(first + int(end) * bytes_each for end in ends)),
         )
         if flag:
             raise ArithmeticError(f"{self.name} failed with flag {flag}")
@@ -232,7 +216,9 @@ def load_functions(
     if where and Path(where).exists():
         library = ctypes.CDLL(where)
         return {
-            name: FrameFunction(Signature(**fields), getattr(library, f"{name}_frames"))
+            name: FrameFunction(
+                Signature(**fields), getattr(library, f"{name}_frames"), library.lanes_count()
+            )
             for name, fields in known["functions"].items()
         }
-    return {f.name(): FrameFunction(Signature.of(f), None, f) for f in build()}
+    return {f.name(): FrameFunction(Signature.of(f), None, function=f) for f in build()}

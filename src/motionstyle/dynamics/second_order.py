@@ -16,8 +16,6 @@ from motionstyle.dynamics.inverse import foot_points, inverse_forces
 from motionstyle.dynamics.symbols import BodyParameters
 
 COUNT, POINTS = len(COORDINATES), len(CONTACT_POINTS)
-# Higher levels make the compiler take minutes and gain little.
-SECOND_ORDER_FLAGS = ("-O1", "-march=native", "-fno-math-errno", "-fPIC", "-shared")
 
 
 @cache
