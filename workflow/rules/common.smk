@@ -186,7 +186,10 @@ JUDGED = [
     for row in STYLES.values()
     for name, kind in KINDS.items()
     if (not kind.style or (row, kind.style) in LEARNT)
-    and (name in NIO["kinds"] or (row in STUDIED and kind.style in NIO["learners"]))
+    and (
+        name in NIO["kinds"]
+        or (row in STUDIED and (name in NIO["studied_kinds"] or kind.style in NIO["learners"]))
+    )
 ]
 
 

@@ -1,201 +1,36 @@
 """Our learner of a style: Gauss–Newton on the motion itself, along a shrinking pull towards X_T.
 
 The paper descends G alone, each step from an X_S that may lie anywhere. Here θ is moved so that X_S
-comes to X_T: an optimum's derivative by θ is known exactly (`spacetime.sensitivity`), so
-
-    min over θ:  rms²(X_S(θ) − X_T)  +  w_G G/E(X_T)  +  w_0 |y − y_0|²     (degrees², y scaled θ)
-
-is a least-squares problem. At first X_S is also pulled towards X_T (closeness κ): close to X_T the
+comes to X_T (`nio.optima`). At first X_S is also pulled towards X_T (closeness κ): close to X_T the
 optimum is unique, easily found and nearly linear in θ. κ falls to 0 in stages, each starting from
 the last one's θ; only κ = 0 is NIO's own problem. G keeps θ from making X_T's torques small instead
 of optimal. Springs are gentler (gain 60/rad) in these stages.
 
-Close to X_T the solver may follow an optimum that is not the lowest. So rounds follow, on the
-problem itself: a solve from X_T goes its own way, and where it ends lower than what was followed
-(a counterexample to θ), θ is moved on from there.
+Close to X_T the solver follows an optimum that need not be the only one. So rounds follow, on the
+problem itself: a solve goes its own way, from X_T or from a motion away from it, and where it ends
+elsewhere (a counterexample to θ), both optima are brought to X_T together from there on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import lsq_linear
-
-from motionstyle.body.layout import JOINT_COORDINATES
 from motionstyle.dynamics.passive import SIGMOID_GAIN
-from motionstyle.nio.derivatives import SIZE, energy_by_style, joint_response
-from motionstyle.nio.inner import (
-    Inner,
-    InnerSettings,
-    Learnt,
-    inner_solve,
-    learning_row,
-    learnt,
-)
-from motionstyle.nio.learning_problem import Cost, LearningProblem, target_cost
-from motionstyle.nio.style_space import StyleSpace
+from motionstyle.motion.difference import joint_rms_deg
+from motionstyle.nio.inner import Inner, Learnt, learning_row, learnt
+from motionstyle.nio.learning_problem import LearningProblem, cost_of_point
+from motionstyle.nio.optima import Learner, OurSettings, Stage, State
 from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.solver_point import SolverSettings
 from motionstyle.spacetime.spacetime_problem import COUNT
-from motionstyle.spacetime.style import Style
+from motionstyle.spacetime.starts import perturbed
 
-Array = NDArray[np.float64]
-LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
 MOST_REFUSALS = 4  # in a row, then a stage ends
-NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
-
-
-@dataclass(frozen=True)
-class Stage:
-    """κ per rad², how many steps of θ at most, and the springs' gain per rad."""
-
-    closeness: float
-    steps: int
-    gain: float
-
-
-@dataclass(frozen=True)
-class OurSettings:
-    """Settings of the learner, `config/nio.yaml`.
-
-    Attributes
-    ----------
-    stages : in order. gap_weight : w_G, deg². prior_weight : w_0, deg² per squared unit of y.
-    least_preference, largest_preference : bounds of 29 α.
-    longest_step : of one coordinate of y. farthest_deg : by which no joint angle may be predicted
-        to move in one step.
-    iterations, tolerance, barrier : of inner solves; a step whose solve ends above `usable` is
-        refused.
-    damping : of the normal equations, relative. least_gain : of the objective, below which a stage
-        ends.
-    rounds, round_steps, round_gain : of solves from X_T that go their own way, steps after each,
-        and the springs' gain in them. final_steps : at the paper's gain.
-    """
-
-    stages: Sequence[Stage]
-    gap_weight: float
-    prior_weight: float
-    least_preference: float
-    largest_preference: float
-    longest_step: float
-    farthest_deg: float
-    iterations: int
-    tolerance: float
-    barrier: float
-    usable: float
-    damping: float
-    least_gain: float
-    rounds: int = 0
-    round_steps: int = 0
-    round_gain: float = SIGMOID_GAIN
-    final_steps: int = 0
-
-
-@dataclass(frozen=True)
-class _State:
-    """θ with its X_S, and the residuals of the least-squares problem there."""
-
-    place: Array
-    style: Style
-    inner: Inner
-    target: Cost
-    residuals: Array
-
-    @property
-    def objective(self) -> float:
-        return float((self.residuals**2).sum())
-
-
-class _Learner:
-    """One run: what does not change between its steps."""
-
-    def __init__(self, learning: LearningProblem, settings: OurSettings) -> None:
-        self.learning = learning
-        self.settings = settings
-        self.space = StyleSpace.of(
-            learning.ranges, settings.least_preference, settings.largest_preference
-        )
-        self.origin = self.space.coordinates(learning.start)
-        joints = COUNT - JOINT_COORDINATES.start
-        self.degrees = np.degrees(1.0) / np.sqrt(learning.target.frames * joints)
-
-    def state(
-        self, place: Array, stage: Stage, controls: Array | None, before: Inner | None
-    ) -> _State:
-        """Return the state at y, its X_S found from control points near it."""
-        settings = self.settings
-        style = self.space.style(place, self.learning.start)
-        inner = inner_solve(
-            self.learning,
-            style,
-            InnerSettings(
-                stage.closeness, stage.gain, settings.iterations, settings.tolerance,
-                settings.barrier,
-            ),
-            controls,
-            None if before is None else before.result.point,
-        )  # fmt: skip
-        target = target_cost(self.learning, style, stage.gain)
-        away = inner.cost.values.coordinates - self.learning.coordinates
-        parts = [
-            self.degrees * away[:, JOINT_COORDINATES].ravel(),
-            np.sqrt(settings.prior_weight) * (place - self.origin),
-            [np.sqrt(settings.gap_weight * self._gap(inner, target))],
-        ]
-        return _State(place, style, inner, target, np.concatenate(parts))
-
-    @staticmethod
-    def _gap(inner: Inner, target: Cost) -> float:
-        return max((target.total - inner.cost.total) / target.total, LEAST_GAP)
-
-    def usable(self, state: _State) -> bool:
-        """Tell whether a state's X_S is near enough to an optimum to be judged."""
-        enough = state.inner.result.optimality <= self.settings.usable
-        gap = state.target.total - state.inner.cost.total
-        return bool(enough and gap >= -NEGATIVE_GAP * state.target.total)
-
-    def linearised(self, state: _State) -> tuple[Array, Array]:
-        """Return the Jacobian of the residuals by y, and of the control points, (K·35, 147)."""
-        inner, chain = state.inner, self.space.chain(state.style)
-        values, problem = inner.result.values, inner.problem
-        moved, controls = joint_response(problem, inner.result, chain)
-        at_target = energy_by_style(problem, state.target.values)
-        at_synth = energy_by_style(problem, values)
-        total, gap = state.target.total, state.target.total - inner.cost.total
-        by_style = (at_target - at_synth) / total - gap * at_target / total**2
-        root = np.sqrt(self.settings.gap_weight * self._gap(inner, state.target))
-        rows = [
-            self.degrees * moved,
-            np.sqrt(self.settings.prior_weight) * np.eye(SIZE),
-            (0.5 * self.settings.gap_weight / root * (by_style @ chain))[None],
-        ]
-        return np.concatenate(rows), controls
-
-    def step(self, state: _State, jacobian: Array, trust: float) -> Array:
-        """Return the step of y that the linearised problem asks for, in its bounds.
-
-        trust : share of the longest step, of each coordinate of y.
-        """
-        normal = jacobian.T @ jacobian
-        pull = jacobian.T @ state.residuals
-        normal[np.diag_indices(SIZE)] += self.settings.damping * np.trace(normal) / SIZE
-        root = cholesky(normal)
-        wanted = solve_triangular(root, -pull, trans=1)
-        low, high = self.space.room(state.place)
-        longest = trust * self.settings.longest_step
-        low = np.minimum(np.maximum(low, -longest), -1e-12)
-        high = np.maximum(np.minimum(high, longest), 1e-12)
-        found = lsq_linear(root, wanted, bounds=(low, high)).x
-        count = len(state.residuals) - SIZE - 1
-        farthest = np.abs(jacobian[:count] @ found).max() / self.degrees
-        farthest_deg = float(np.degrees(farthest))
-        return found * min(1.0, self.settings.farthest_deg / max(farthest_deg, 1e-12))
+# Of what the linear model promised: above, the next step may be longer; below, it is shorter.
+GOOD_SHARE, POOR_SHARE, MOST_TRUST = 0.6, 0.25, 8.0
+AWAY_SEED = 1000  # of the noise that every second round starts from; judging has other seeds
 
 
 def learn(
@@ -208,79 +43,103 @@ def learn(
     Rows hold every step tried; `accepted` tells which were taken. The style returned is the last
     stage's best.
     """
-    learner = _Learner(learning, settings)
+    learner = Learner(learning, settings)
     began = perf_counter()
     rows: list[dict[str, Any]] = []
-    state: _State | None = None
-    place, trust = learner.origin, 1.0
 
-    def record(found: _State, stage: Stage, accepted: bool) -> None:
-        row = learning_row(learning, found.style, found.target, found.inner)
+    def record(found: State, stage: Stage, accepted: bool) -> None:
+        row = learning_row(learning, found.style, found.target, found.lowest)
         row |= {"iteration": len(rows), "closeness": stage.closeness, "gain": stage.gain}
-        row |= {"accepted": accepted, "objective": found.objective}
+        row |= {"accepted": accepted, "objective": found.objective, "optima": len(found.inners)}
         rows.append(row | {"seconds": perf_counter() - began})
+        errors = [
+            f"{learning.joint_error_deg(i.cost.values.coordinates):.2f}°" for i in found.inners
+        ]
         log(
             f"{len(rows) - 1:3d} κ {stage.closeness:g} gain {stage.gain:g}: objective "
-            f"{found.objective:.3f}, {row['joint_error_deg']:.2f}°, G/E "
+            f"{found.objective:.3f}, {' '.join(errors)}, G/E "
             f"{row['G_over_E_target']:.3f}, E {row['E_target']:.0f}, {row['inner_iterations']} its "
             f"{row['status']}{'' if accepted else ', refused'}, {rows[-1]['seconds']:.0f} s"
         )
 
+    if not settings.stages:
+        raise ValueError("the learner needs at least one stage")
+    state, trust = learner.state(learner.origin, settings.stages[0], [(None, None)]), 1.0
     for stage in settings.stages:
-        before = None if state is None else state.inner
-        state = learner.state(place, stage, None, before)
-        if not learner.usable(state):
-            # From a neighbour it failed: X_T itself is the safest start there is.
-            state = learner.state(place, stage, learning.controls, None)
+        state = _followed(learner, state, stage)
         record(state, stage, True)
         state, trust = _stage(learner, state, stage, trust, record)
-        place = state.place
-    if state is None:
-        raise ValueError("the learner needs at least one stage")
     free = Stage(0.0, settings.round_steps, settings.round_gain)
+    state = _followed(learner, state, free)
+    record(state, free, True)
+    state, trust = _stage(learner, state, free, trust, record)
+    known = 0  # rounds in a row that found nothing new
     for turn in range(settings.rounds):
-        found = _from_target(learner, state, free)
-        lower = found.inner.cost.total < (1 - NEGATIVE_GAP) * state.inner.cost.total
-        if turn == 0 or lower:
-            record(found, free, True)
-            state, trust = found, 1.0
-        before = state.objective
-        state, trust = _stage(learner, state, free, trust, record)
-        if not lower and state.objective > (1 - settings.least_gain) * before:
-            break
+        rival = _rival(learner, state, free, turn)
+        if rival is None:
+            known += 1
+            if known == 2:
+                break
+            continue
+        known = 0
+        optima = [state.inners[0], *state.inners[1:][-settings.most_optima + 2 :], rival]
+        state = learner.judged(state.place, state.style, free, optima)
+        record(state, free, True)
+        state, trust = _stage(learner, state, free, 1.0, record)
     final = Stage(0.0, settings.final_steps, SIGMOID_GAIN)
-    found = learner.state(state.place, final, None, state.inner)
-    if not learner.usable(found):
-        found = _from_target(learner, state, final)
-    record(found, final, True)
-    state, trust = _stage(learner, found, final, trust, record)
-    return learnt(learning, "ours", state.style, state.inner, rows)
+    state = _followed(learner, state, final)
+    record(state, final, True)
+    state, trust = _stage(learner, state, final, trust, record)
+    return learnt(learning, "ours", state.style, state.lowest, rows)
 
 
-def _from_target(learner: _Learner, state: _State, stage: Stage) -> _State:
-    """Return the state at the same θ whose X_S a solve from X_T finds by itself."""
-    learning = learner.learning
+def _followed(learner: Learner, state: State, stage: Stage) -> State:
+    """Return the state of the same θ in another stage, its optima followed there."""
+    found = learner.state(state.place, stage, [(None, i.result) for i in state.inners])
+    if learner.usable(found):
+        return found
+    # From a neighbour it failed: X_T itself is the safest start there is.
+    return learner.state(state.place, stage, [(learner.learning.controls, None)])
+
+
+def _rival(learner: Learner, state: State, stage: Stage, turn: int) -> Inner | None:
+    """Return an optimum of the same θ that is none of the known ones, if a solve finds one.
+
+    Even turns start from X_T, odd ones from smooth noise about it, both by way of gentler problems.
+    """
+    learning, settings = learner.learning, learner.settings
     problem = learning.problem(state.style, gain=stage.gain)
-    solved = solve_spacetime(
-        problem, learning.controls, settings=SolverSettings(tolerance=learner.settings.tolerance)
-    )
-    return learner.state(state.place, stage, None, replace(state.inner, result=solved))
+    start = learning.controls
+    if turn % 2:
+        start = problem.basis().fit(perturbed(learning.target, AWAY_SEED + turn).coordinates)
+    solved = solve_spacetime(problem, start, settings=SolverSettings(tolerance=settings.tolerance))
+    if solved.optimality > settings.usable:
+        return None
+    cost = cost_of_point(problem, solved.point)
+    away = [
+        joint_rms_deg(cost.values.coordinates, inner.cost.values.coordinates)
+        for inner in state.inners
+    ]
+    return Inner(problem, solved, cost) if min(away) > settings.new_deg else None
 
 
 def _stage(
-    learner: _Learner,
-    state: _State,
+    learner: Learner,
+    state: State,
     stage: Stage,
     trust: float,
-    record: Callable[[_State, Stage, bool], None],
-) -> tuple[_State, float]:
+    record: Callable[[State, Stage, bool], None],
+) -> tuple[State, float]:
     """Return the best state of one stage, and the trust to go on with."""
     jacobian, controls = learner.linearised(state)
     refused = 0
     for _ in range(stage.steps):
-        step = learner.step(state, jacobian, trust)
-        moved = state.inner.result.point.controls + (controls @ step).reshape(-1, COUNT)
-        found = learner.state(state.place + step, stage, moved, state.inner)
+        step, promised = learner.step(state, jacobian, trust)
+        starts = [
+            (inner.result.point.controls + (by_style @ step).reshape(-1, COUNT), inner.result)
+            for inner, by_style in zip(state.inners, controls, strict=True)
+        ]
+        found = learner.state(state.place + step, stage, starts)
         better = learner.usable(found) and found.objective < state.objective
         record(found, stage, better)
         if not better:
@@ -289,8 +148,28 @@ def _stage(
                 break
             continue
         gained = 1 - found.objective / state.objective
-        trust, refused, state = min(1.0, 1.5 * trust), 0, found
+        kept = (state.objective - found.objective) / max(state.objective - promised, 1e-12)
+        if kept > GOOD_SHARE:
+            trust = min(MOST_TRUST, 2 * trust)
+        elif kept < POOR_SHARE:
+            trust *= 0.5
+        refused, state = 0, _distinct(learner, found, stage)
         if gained < learner.settings.least_gain:
             break
         jacobian, controls = learner.linearised(state)
     return state, min(1.0, 2 * trust)
+
+
+def _distinct(learner: Learner, state: State, stage: Stage) -> State:
+    """Return the state without optima that have become one with an earlier one."""
+    kept: list[Inner] = []
+    for inner in state.inners:
+        here = inner.cost.values.coordinates
+        if all(
+            joint_rms_deg(here, other.cost.values.coordinates) > 0.5 * learner.settings.new_deg
+            for other in kept
+        ):
+            kept.append(inner)
+    if len(kept) == len(state.inners):
+        return state
+    return learner.judged(state.place, state.style, stage, kept)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from motionstyle.errors import MotionStyleError, near_matches
-from motionstyle.nio.ours import OurSettings, Stage
+from motionstyle.nio.optima import OurSettings, Stage
 from motionstyle.nio.paper import PaperSettings
 
 

@@ -16,7 +16,15 @@ LEARNING_COLUMNS = (
     *("step_10", "accepted"),
     *("G", "G_over_E_target", "E_target", "E_synth", "muscle_target", "root_target"),
     *("muscle_synth", "root_synth", "muscle_gap_over_E_target", "root_gap_over_E_target"),
-    *("objective", "not_rising", "joint_error_deg", "status", "optimality", "inner_iterations"),
+    *(
+        "objective",
+        "not_rising",
+        "joint_error_deg",
+        "status",
+        "optimality",
+        "inner_iterations",
+        "optima",
+    ),
     *("inner_solves", "closeness", "gain", "step", "effective_joints_in_alpha"),
     *("effective_joints_in_E", "alpha_on_idle_joints", "passive_over_muscle", "seconds", "reason"),
 )
