@@ -8,7 +8,7 @@ import pytest
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.records import check_projection
-from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
+from motionstyle.nio.derivatives import energy_by_style, mixed_derivatives
 from motionstyle.nio.inner import InnerSettings, inner_solve
 from motionstyle.nio.learning_problem import (
     ROOT_LIMIT_N,
