@@ -5,7 +5,7 @@ defect iii; `scaled = False` keeps the printed units as a reference), θ stays i
 line search brackets with G̃ of frozen X_S (eq. 20) and is accepted only if the true G + D falls
 (defects i, ii). Inner solves are cut off early, as the authors' were, but each starts from the
 lowest X_S known, and G takes the lowest of all X_S found so far: cut off from X_T anew, E(X_S) ends
-at up to three times its minimum, anywhere, and G + D of neighbouring θ cannot be told apart.
+at up to four times its minimum, anywhere, and G + D of neighbouring θ cannot be told apart.
 """
 
 from __future__ import annotations
