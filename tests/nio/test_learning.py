@@ -8,7 +8,7 @@ import pytest
 
 from motionstyle.errors import MotionStyleError
 from motionstyle.evaluation.nio.records import check_projection
-from motionstyle.nio.derivatives import SIZE, energy_by_style, mixed_derivatives
+from motionstyle.nio.derivatives import energy_by_style, mixed_derivatives
 from motionstyle.nio.inner import InnerSettings, inner_solve
 from motionstyle.nio.learning_problem import (
     ROOT_LIMIT_N,
@@ -16,7 +16,7 @@ from motionstyle.nio.learning_problem import (
     learning_problem,
     target_cost,
 )
-from motionstyle.nio.paper import PaperSettings, learn_as_paper
+from motionstyle.nio.paper import PaperSettings, learn_as_paper, soft_constraints
 from motionstyle.nio.preferences import PreferenceSettings, learn_preferences, lowest, plane
 from motionstyle.spacetime.solver_point import FORCE_UNIT
 from motionstyle.spacetime.spacetime_problem import Evaluator
@@ -146,13 +146,59 @@ def test_at_an_exact_solution_g_and_its_gradient_vanish(made_learning, style, so
     assert target_cost(twin, made_learning.start, GAIN).total > 1.05 * other.cost.total
 
 
-def test_the_papers_objective_never_rises(made_learning):
-    settings = PaperSettings(iterations=1, inner_iterations=12)
-    found = learn_as_paper(made_learning, settings, quiet)
+QUICK = PaperSettings(iterations=4, first_iterations=40, inner_iterations=12, kept=3)
+
+
+@pytest.fixture(scope="module")
+def as_paper(made_learning):
+    return learn_as_paper(made_learning, QUICK, quiet)
+
+
+def test_the_papers_objective_never_rises_and_learning_goes_on(made_learning, as_paper):
+    rows = as_paper.rows
+    assert [row["iteration"] for row in rows] == list(range(QUICK.iterations + 1))
+    objectives = [row["objective"] for row in rows]
+    assert all(b < a for a, b in pairwise(objectives))
+    assert objectives[-1] < 0.7 * objectives[0]
+    solves = [row["inner_solves"] for row in rows]
+    assert all(b > a for a, b in pairwise(solves))
+    # What is told of the last style is true: its X_S is feasible, and E(X_T) that of its θ.
+    target = target_cost(made_learning, as_paper.style)
+    assert rows[-1]["E_target"] == pytest.approx(target.energy)
+    assert rows[-1]["G"] + soft_constraints(as_paper.style.preferences) == pytest.approx(
+        objectives[-1]
+    )
+
+
+def test_the_papers_unknowns_stay_in_bounds_and_in_the_box_of_a_step(made_learning, as_paper):
+    style, start = as_paper.style, made_learning.start
+    assert style.preferences.min() >= QUICK.least_preference / 29 - 1e-15
+    passive = style.vector()[29:116]
+    assert passive.min() >= 0
+    low, high = made_learning.ranges[6:].T
+    assert np.all((style.passive.rest_angle >= low) & (style.passive.rest_angle <= high))
+    farthest = np.abs(np.log(style.preferences / start.preferences)).max()
+    assert 0 < farthest <= QUICK.iterations * QUICK.longest_step
+
+
+def test_a_solve_cut_off_above_the_captured_motion_lowers_nothing(made_learning):
+    """Far away and cut off at once, E(X_S) ends above E(X_T): no reason to believe that G is 0."""
+    far = replace(QUICK, iterations=2, first_iterations=100, inner_iterations=1, longest_step=8.0)
+    rows = learn_as_paper(made_learning, far, quiet).rows
+    assert len(rows) == 3
+    assert all(row["G"] > 0.5 * row["E_target"] for row in rows)
+    assert rows[-1]["E_target"] < rows[0]["E_target"]
+
+
+def test_printed_units_are_a_reference(made_learning):
+    """Unscaled, all that moves is the shoe's stiffness or α, by as much as β leaves."""
+    found = learn_as_paper(
+        made_learning, replace(QUICK, scaled=False, iterations=1, trials=1), quiet
+    )
     objectives = [row["objective"] for row in found.rows]
-    assert len(objectives) >= 2
-    assert all(b <= a for a, b in pairwise(objectives))
-    assert found.style.vector().shape == (SIZE,)
+    assert objectives == sorted(objectives, reverse=True)
+    springs = found.style.vector()[29:87] - made_learning.start.vector()[29:87]
+    assert np.abs(springs).max() < 1.0  # N·m/rad
 
 
 def test_planes_bound_g_from_below(made_learning, style, solved):

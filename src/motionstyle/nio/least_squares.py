@@ -47,7 +47,7 @@ def learn_by_least_squares(
     origin = space.coordinates(learning.start)
     low, high = (origin + room for room in space.room(origin))
     inner_settings = InnerSettings(
-        0.0, SIGMOID_GAIN, settings.inner_iterations, 1e-6, settings.barrier
+        0.0, SIGMOID_GAIN, settings.inner_iterations, 1e-6, settings.first_barrier
     )
     began = perf_counter()
     rows: list[dict[str, Any]] = []
