@@ -8,7 +8,8 @@ comes to X_T: an optimum's derivative by θ is known exactly (`spacetime.sensiti
 is a least-squares problem. At first X_S is also pulled towards X_T (closeness κ): close to X_T the
 optimum is unique, easily found and nearly linear in θ. κ falls to 0 in stages, each starting from
 the last one's θ; only κ = 0 is NIO's own problem. G keeps θ from making X_T's torques small instead
-of optimal. Springs are gentler (gain 60/rad) in these stages.
+of optimal. Springs are gentler (gain 60/rad) in these stages. κ is counted in the clip's own
+E(X_T) a frame, which is seven times as large for a run as for a walk.
 
 Close to X_T the solver may follow an optimum that is not the lowest. So rounds follow, on the
 problem itself: a solve from X_T goes its own way, and where it ends lower than what was followed
@@ -48,12 +49,16 @@ from motionstyle.spacetime.style import Style
 Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
 MOST_REFUSALS = 4  # in a row, then a stage ends
+LEAST_PUSH_N = 1.0  # of a shoe, to be one that pushes
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
 @dataclass(frozen=True)
 class Stage:
-    """κ per rad², how many steps of θ at most, and the springs' gain per rad."""
+    """κ, how many steps of θ at most, and the springs' gain per rad.
+
+    closeness : κ in E(X_T; θ of the start) a frame and rad², so that all clips are pulled alike.
+    """
 
     closeness: float
     steps: int
@@ -118,9 +123,11 @@ class _Learner:
     def __init__(self, learning: LearningProblem, settings: OurSettings) -> None:
         self.learning = learning
         self.settings = settings
-        self.space = StyleSpace.of(
+        space = StyleSpace.of(
             learning.ranges, settings.least_preference, settings.largest_preference
         )
+        self.space = space.keeping_shoes(learning.start) if shoe_in_flight(learning) else space
+        self.unit = target_cost(learning, learning.start).total / learning.target.frames
         self.origin = self.space.coordinates(learning.start)
         joints = COUNT - JOINT_COORDINATES.start
         self.degrees = np.degrees(1.0) / np.sqrt(learning.target.frames * joints)
@@ -135,8 +142,8 @@ class _Learner:
             self.learning,
             style,
             InnerSettings(
-                stage.closeness, stage.gain, settings.iterations, settings.tolerance,
-                settings.barrier,
+                stage.closeness * self.unit, stage.gain, settings.iterations,
+                settings.tolerance, settings.barrier,
             ),
             controls,
             None if before is None else before.result.point,
@@ -196,6 +203,17 @@ class _Learner:
         farthest = np.abs(jacobian[:count] @ found).max() / self.degrees
         farthest_deg = float(np.degrees(farthest))
         return found * min(1.0, self.settings.farthest_deg / max(farthest_deg, 1e-12))
+
+
+def shoe_in_flight(learning: LearningProblem) -> bool:
+    """Tell whether a shoe pushes on X_T while no foot point is held.
+
+    Nothing can balance another shoe's force there: X_T obeys Newton with the shoes it was projected
+    with and no others, and a tenth of a millimetre of h̄ puts newtons into its root residual.
+    """
+    flight = ~learning.feet.held.any(axis=1)
+    pushes = target_cost(learning, learning.start).values.shoe_forces[flight]
+    return bool(np.linalg.norm(pushes.sum(axis=1), axis=-1).max(initial=0.0) > LEAST_PUSH_N)
 
 
 def learn(
