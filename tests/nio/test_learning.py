@@ -16,8 +16,11 @@ from motionstyle.nio.learning_problem import (
     learning_problem,
     target_cost,
 )
+from motionstyle.nio.optima import shoe_in_flight
 from motionstyle.nio.paper import PaperSettings, learn_as_paper, soft_constraints
 from motionstyle.nio.preferences import PreferenceSettings, learn_preferences, lowest, plane
+from motionstyle.nio.style_space import StyleSpace
+from motionstyle.spacetime.footprint_constraints import captured_constraints
 from motionstyle.spacetime.solver_point import FORCE_UNIT
 from motionstyle.spacetime.spacetime_problem import Evaluator
 
@@ -259,3 +262,42 @@ def test_a_window_without_its_contacts_is_refused(made_walk, all_functions):
 
 def test_a_walk_is_near_one_that_obeys_the_dynamics(made_learning):
     check_projection(made_learning)
+
+
+def test_the_projected_motion_keeps_its_feet_above_the_ground_it_was_projected_on(made_learning):
+    """Found anew, the ground would lie elsewhere, and shoes would push where nothing balances."""
+    feet = made_learning.feet
+    evaluator = Evaluator(made_learning.problem(made_learning.start))
+    values = evaluator.values(made_learning.controls, np.zeros((feet.frames, 32)))
+    before = captured_constraints(made_learning.captured, "path")
+    assert not np.allclose(before.targets[feet.held], feet.targets[feet.held], atol=1e-6)
+    np.testing.assert_array_equal(feet.ground, before.ground)
+    np.testing.assert_array_equal(feet.held, before.held)
+    assert np.abs(values.foot_residuals).max() < 1e-9
+    heights = ((values.points - feet.ground) * feet.normals).sum(axis=-1)
+    assert (heights >= feet.clearance - 1e-12)[~feet.held].all()
+
+
+def test_a_shoe_that_pushes_in_flight_is_found(made_learning):
+    assert not shoe_in_flight(made_learning)
+    feet = made_learning.feet
+    pushes = target_cost(made_learning, made_learning.start).values.shoe_forces
+    frame = int(np.argmax(np.linalg.norm(pushes.sum(axis=1), axis=-1)))
+    held = feet.held.copy()
+    held[frame] = False
+    assert shoe_in_flight(replace(made_learning, feet=replace(feet, held=held)))
+    shoeless = replace(made_learning.start, shoe_stiffness=0.0)
+    loose = replace(made_learning, feet=replace(feet, held=held), start=shoeless)
+    assert not shoe_in_flight(loose)
+
+
+def test_a_space_that_keeps_shoes_leaves_all_else_free(made_learning, style):
+    usual = StyleSpace.of(made_learning.ranges, 0.1, 10.0)
+    space = usual.keeping_shoes(made_learning.start)
+    y = space.coordinates(style) + 0.5
+    found = space.style(y, style)
+    assert (found.shoe_stiffness, found.shoe_rest_length) == (
+        made_learning.start.shoe_stiffness,
+        made_learning.start.shoe_rest_length,
+    )
+    np.testing.assert_allclose(found.vector()[:-2], usual.style(y, style).vector()[:-2])

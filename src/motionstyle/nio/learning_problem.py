@@ -189,7 +189,7 @@ def learning_problem(
         target=target,
         controls=found.point.controls,
         coordinates=values.coordinates,
-        feet=captured_constraints(target, "path"),  # which X_T now keeps to the last
+        feet=_kept_by(feet, values.points),
         ranges=ranges,
         start=replace(style, about=about),
         projection=projection,
@@ -204,6 +204,21 @@ def _tracking(coordinates: Array, closeness: float) -> Tracking | None:
     weights = np.full(COUNT, float(closeness))
     weights[:3] *= PLACE_BY_ANGLE
     return Tracking(coordinates, weights)
+
+
+def _kept_by(feet: FootConstraints, points: Array) -> FootConstraints:
+    """Return constraints whose targets and clearance are those of foot points (F, 8, 3), m.
+
+    The ground under swinging feet stays as it was: found anew it would lie some tenths of a
+    millimetre elsewhere, which a shoe answers with newtons that nothing balances in flight.
+    """
+    held = feet.held[..., None]
+    heights = ((points - feet.ground) * feet.normals).sum(axis=-1)
+    return replace(
+        feet,
+        targets=np.where(held, points, feet.targets),
+        clearance=np.where(feet.held, 0.0, np.minimum(heights, 0.0)),
+    )
 
 
 def _project(

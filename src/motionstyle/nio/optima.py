@@ -28,12 +28,17 @@ from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
+LEAST_PUSH_N = 1.0  # of a shoe, to be one that pushes
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
 @dataclass(frozen=True)
 class Stage:
-    """κ per rad², how many steps of θ at most, and the springs' gain per rad."""
+    """κ, how many steps of θ at most, and the springs' gain per rad.
+
+    closeness : κ in E(X_T; θ of the start) a frame and rad², so that all clips are pulled alike: a
+        run's E is seven times a walk's.
+    """
 
     closeness: float
     steps: int
@@ -110,9 +115,11 @@ class Learner:
     def __init__(self, learning: LearningProblem, settings: OurSettings) -> None:
         self.learning = learning
         self.settings = settings
-        self.space = StyleSpace.of(
+        space = StyleSpace.of(
             learning.ranges, settings.least_preference, settings.largest_preference
         )
+        self.space = space.keeping_shoes(learning.start) if shoe_in_flight(learning) else space
+        self.unit = target_cost(learning, learning.start).total / learning.target.frames
         self.origin = self.space.coordinates(learning.start)
         joints = COUNT - JOINT_COORDINATES.start
         self.degrees = np.degrees(1.0) / np.sqrt(learning.target.frames * joints)
@@ -130,8 +137,9 @@ class Learner:
         settings = self.settings
         style = self.space.style(place, self.learning.start)
         how = InnerSettings(
-            stage.closeness, stage.gain, settings.iterations, settings.tolerance, settings.barrier
-        )
+            stage.closeness * self.unit, stage.gain, settings.iterations, settings.tolerance,
+            settings.barrier,
+        )  # fmt: skip
         inners = [
             inner_solve(self.learning, style, how, controls, before and before.point)
             for controls, before in starts
@@ -202,3 +210,14 @@ class Learner:
         farthest_deg = float(np.degrees(np.abs(jacobian[:count] @ found).max() / share))
         found *= min(1.0, trust * self.settings.farthest_deg / max(farthest_deg, 1e-12))
         return found, float(((state.residuals + jacobian @ found) ** 2).sum())
+
+
+def shoe_in_flight(learning: LearningProblem) -> bool:
+    """Tell whether a shoe pushes on X_T while no foot point is held.
+
+    Nothing can balance another shoe's force there: X_T obeys Newton with the shoes it was projected
+    with and no others, and a tenth of a millimetre of h̄ puts newtons into its root residual.
+    """
+    flight = ~learning.feet.held.any(axis=1)
+    pushes = target_cost(learning, learning.start).values.shoe_forces[flight]
+    return bool(np.linalg.norm(pushes.sum(axis=1), axis=-1).max(initial=0.0) > LEAST_PUSH_N)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,15 @@ class StyleSpace:
                  [LARGEST_SHOE_STIFFNESS, LARGEST_SHOE_LENGTH]]
             ),
         )  # fmt: skip
+
+    def keeping_shoes(self, style: Style) -> StyleSpace:
+        """Return the space of styles that have the shoes of one."""
+        shoes = style.vector()[-2:]
+        return replace(
+            self,
+            low=np.concatenate([self.low[:-2], shoes]),
+            high=np.concatenate([self.high[:-2], shoes]),
+        )
 
     def coordinates(self, style: Style) -> Array:
         """Return y of a style, moved inside the bounds, (147,)."""
