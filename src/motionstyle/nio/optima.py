@@ -51,7 +51,8 @@ class OurSettings:
 
     Attributes
     ----------
-    stages : in order. gap_weight : w_G, deg². prior_weight : w_0, deg² per squared unit of y.
+    stages : in order. most_between : stages that may be put between two where X_S jumps.
+    gap_weight : w_G, deg². prior_weight : w_0, deg² per squared unit of y.
     least_preference, largest_preference : bounds of 29 α.
     longest_step : of one coordinate of y. farthest_deg : by which no joint angle may be predicted
         to move in one step.
@@ -77,6 +78,7 @@ class OurSettings:
     usable: float
     damping: float
     least_gain: float
+    most_between: int = 3
     rounds: int = 0
     round_steps: int = 0
     round_gain: float = SIGMOID_GAIN

@@ -3,8 +3,8 @@
 The paper descends G alone, each step from an X_S that may lie anywhere. Here θ is moved so that X_S
 comes to X_T (`nio.optima`). At first X_S is also pulled towards X_T (closeness κ): close to X_T the
 optimum is unique, easily found and nearly linear in θ. κ falls to 0 in stages, each starting from
-the last one's θ; only κ = 0 is NIO's own problem. G keeps θ from making X_T's torques small instead
-of optimal. Springs are gentler (gain 60/rad) in these stages.
+the last one's θ, with stages between where X_S jumps; only κ = 0 is NIO's own problem. G keeps θ
+from making X_T's torques small instead of optimal. Springs are gentler (gain 60/rad) here.
 
 Close to X_T the solver follows an optimum that need not be the only one. So rounds follow, on the
 problem itself: a solve goes its own way, from X_T or from a motion away from it, and where it ends
@@ -14,8 +14,11 @@ elsewhere (a counterexample to θ), both optima are brought to X_T together from
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
+
+import numpy as np
 
 from motionstyle.dynamics.passive import SIGMOID_GAIN
 from motionstyle.motion.difference import joint_rms_deg
@@ -30,6 +33,8 @@ from motionstyle.spacetime.starts import perturbed
 MOST_REFUSALS = 4  # in a row, then a stage ends
 # Of what the linear model promised: above, the next step may be longer; below, it is shorter.
 GOOD_SHARE, POOR_SHARE, MOST_TRUST = 0.6, 0.25, 8.0
+JUMP = 2.0  # of the objective: the pull fell too far at once, X_S went elsewhere
+FREE_RATIO = 16.0  # κ = 0 counts as that much less than the last κ where one between is sought
 AWAY_SEED = 1000  # of the noise that every second round starts from; judging has other seeds
 
 
@@ -64,15 +69,23 @@ def learn(
 
     if not settings.stages:
         raise ValueError("the learner needs at least one stage")
-    state, trust = learner.state(learner.origin, settings.stages[0], [(None, None)]), 1.0
-    for stage in settings.stages:
-        state = _followed(learner, state, stage)
-        record(state, stage, True)
-        state, trust = _stage(learner, state, stage, trust, record)
     free = Stage(0.0, settings.round_steps, settings.round_gain)
-    state = _followed(learner, state, free)
-    record(state, free, True)
-    state, trust = _stage(learner, state, free, trust, record)
+    ahead = [*settings.stages, free]
+    stage = ahead.pop(0)
+    state, trust = learner.state(learner.origin, stage, [(None, None)]), 1.0
+    record(state, stage, True)
+    state, trust = _stage(learner, state, stage, trust, record)
+    between = 0
+    while ahead:
+        found = _followed(learner, state, ahead[0])
+        far = found.objective > JUMP * state.objective
+        record(found, ahead[0], not far)
+        if far and between < settings.most_between:
+            between += 1
+            ahead.insert(0, _halfway(stage, ahead[0]))
+            continue
+        between, stage = 0, ahead.pop(0)
+        state, trust = _stage(learner, found, stage, trust, record)
     known = 0  # rounds in a row that found nothing new
     for turn in range(settings.rounds):
         rival = _rival(learner, state, free, turn)
@@ -82,7 +95,9 @@ def learn(
                 break
             continue
         known = 0
-        optima = [state.inners[0], *state.inners[1:][-settings.most_optima + 2 :], rival]
+        others = state.inners[1:]
+        kept = others[max(0, len(others) - settings.most_optima + 2) :]
+        optima = [state.inners[0], *kept, rival]
         state = learner.judged(state.place, state.style, free, optima)
         record(state, free, True)
         state, trust = _stage(learner, state, free, 1.0, record)
@@ -91,6 +106,12 @@ def learn(
     record(state, final, True)
     state, trust = _stage(learner, state, final, trust, record)
     return learnt(learning, "ours", state.style, state.lowest, rows)
+
+
+def _halfway(stage: Stage, following: Stage) -> Stage:
+    """Return a stage between two, by the logarithm of κ."""
+    least = max(following.closeness, stage.closeness / FREE_RATIO)
+    return replace(following, closeness=float(np.sqrt(stage.closeness * least)))
 
 
 def _followed(learner: Learner, state: State, stage: Stage) -> State:
