@@ -44,7 +44,7 @@ def job(log: str | Path) -> Iterator[TextIO]:
     path = Path(log)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle = path.open("w", encoding="utf-8")
+        handle = path.open("w", encoding="utf-8", buffering=1)  # lines can be followed
     except OSError as error:
         print(f"error: cannot write the log: {error}", file=terminal)
         raise SystemExit(1) from None

@@ -15,7 +15,7 @@ with job(snakemake.log[0]):
         for m in motions
     ]
     if motions:
-        figure = strip_figure(motions, titles, view="travel", forces=True)
+        figure = strip_figure(motions, titles, view="travel", forces=True, paired=True)
     else:
         figure = blank_figure("no motion to show")
     save(figure, Path(snakemake.output.svg).with_suffix(""))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,6 +37,9 @@ LONGEST_M = 6.6  # of travel drawn; what comes later is left out and the title s
 HARDLY_TRAVELS_M = 1.5  # below this the figures are pushed apart with time
 FORCE_SCALE_M = 0.5  # length of an arrow of one body weight
 GRAVITY = 9.81
+MARGIN_IN = 0.7  # beside a strip, for its labels
+SHORT_TITLE = 46  # letters of a line above half a page
+SHORT_SHARE = 0.65  # of the widest strip: shorter ones may share a row
 
 
 @dataclass(frozen=True)
@@ -216,12 +220,31 @@ def _label(
     axes.set_title(text, loc="left")
 
 
+def _rows(widths: Sequence[float], half: float) -> list[list[int]]:
+    """Return which strips share a row: two of those at most half a page wide."""
+    rows: list[list[int]] = []
+    waiting: list[int] | None = None
+    for k, width in enumerate(widths):
+        if width <= half and waiting is not None:
+            waiting.append(k)
+            waiting = None
+            continue
+        rows.append([k])
+        if width <= half:
+            waiting = rows[-1]
+    return rows
+
+
 def fit_strips(
     motions: Sequence[Motion],
     titles: Sequence[str] | None,
     draw: Callable[[Axes, Motion, str], object],
+    *,
+    paired: bool = False,
 ) -> Figure:
     """Return a figure with one strip per motion, drawn by `draw`, all on the same scale.
+
+    paired : two of the shorter strips share a row, so that many motions fit a page.
 
     Raises
     ------
@@ -233,18 +256,31 @@ def fit_strips(
         raise MotionStyleError(f"a strip figure of {len(motions)} motions got {len(names)} titles")
     figure = new_figure(1.0)
     grid = figure.subplots(len(motions), 1, squeeze=False)[:, 0]
-    extents = []
     for axes, motion, name in zip(grid, motions, names, strict=True):
         draw(axes, motion, name)
-        extents.append((np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+    extents = [(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())) for axes in grid]
     widest = max(width for width, _height in extents)
-    scale = (PRINT_WIDTH_IN - 0.7) / widest  # inches of paper per metre
-    for axes, (width, _height) in zip(grid, extents, strict=True):
-        left, right = axes.get_xlim()
-        axes.set_xlim(left, right + widest - width)
-    heights = [height * scale + 0.65 for _width, height in extents]
+    scale = (PRINT_WIDTH_IN - MARGIN_IN) / widest  # inches of paper per metre
+    short = [width for width, _height in extents if width <= SHORT_SHARE * widest]
+    half = max(short, default=0.0) if paired else 0.0
+    if len(short) > 1 and paired:
+        scale = min(scale, (PRINT_WIDTH_IN / 2 - MARGIN_IN) / half)
+    widest = (PRINT_WIDTH_IN - MARGIN_IN) / scale
+    rows = _rows([width for width, _height in extents], half)
+    heights = [max(extents[k][1] for k in row) * scale + 0.65 for row in rows]
     figure.set_size_inches(PRINT_WIDTH_IN, sum(heights) + 0.35)
-    grid[0].get_subplotspec().get_gridspec().set_height_ratios(heights)
+    places = figure.add_gridspec(len(rows), 2, height_ratios=heights)
+    for row, at in zip(rows, range(len(rows)), strict=True):
+        for column, k in enumerate(row):
+            alone = extents[k][0] > half or not paired
+            grid[k].set_subplotspec(places[at, :] if alone else places[at, column])
+            left, right = grid[k].get_xlim()
+            room = widest if alone else half
+            grid[k].set_xlim(left, right + room - extents[k][0])
+            if not alone:
+                grid[k].set_xlabel("distance, m (below each figure: time, s)", loc="left")
+                title = grid[k].get_title(loc="left")
+                grid[k].set_title(fill(title, SHORT_TITLE), loc="left")
     return figure
 
 
@@ -256,10 +292,12 @@ def strip_figure(
     view: View = "side",
     n: int | None = None,
     forces: bool = False,
+    paired: bool = False,
 ) -> Figure:
     """Return a figure with one strip per motion, one above the other on the same scale.
 
     forces : draw contact forces, where known; an arrow of half a metre is one body weight.
+    paired : two of the shorter strips share a row.
 
     Raises
     ------
@@ -272,6 +310,7 @@ def strip_figure(
         lambda axes, motion, name: stick_strip(
             axes, motion, n, view=view, title=name, forces=forces
         ),
+        paired=paired,
     )
     handles = [
         Line2D([], [], color=SIDE_COLOURS[side], linestyle=SIDE_LINES[side], label=label)

@@ -1,0 +1,114 @@
+"""Our learner: its derivatives against differences, and what its steps promise."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from motionstyle.configuration import read_settings
+from motionstyle.errors import MotionStyleError
+from motionstyle.nio import ours
+from motionstyle.nio.inner import InnerSettings, inner_solve
+from motionstyle.nio.optima import Learner, Stage
+from motionstyle.nio.settings import our_settings
+
+ROOT = Path(__file__).parents[2]
+PULLED = Stage(0.1, 3, 60.0)
+
+
+def quiet(_text):
+    pass
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return read_settings(ROOT / "config/nio.yaml", ROOT / "workflow/schemas/nio.schema.json")
+
+
+@pytest.fixture(scope="module")
+def settings(shipped):
+    stages = [PULLED, Stage(0.01, 3, 60.0)]
+    found = our_settings(shipped, "quick")
+    return replace(found, stages=stages, round_steps=2, rounds=1, final_steps=1, tolerance=1e-8)
+
+
+@pytest.fixture(scope="module")
+def learner(made_learning, settings):
+    return Learner(made_learning, settings)
+
+
+@pytest.fixture(scope="module")
+def state(learner):
+    return learner.state(learner.origin, PULLED, [(None, None)])
+
+
+@pytest.fixture(scope="module")
+def rows(made_learning, settings):
+    return ours.learn(made_learning, settings, quiet).rows
+
+
+def test_the_jacobian_is_what_differences_of_the_residuals_are(learner, state):
+    both = learner.judged(state.place, state.style, PULLED, state.inners * 2)
+    jacobian, controls = learner.linearised(both)
+    assert len(controls) == 2
+    way = np.random.default_rng(0).standard_normal(len(state.place))
+    low, high = learner.space.room(state.place)
+    way[(low > -1e-2) | (high < 1e-2)] = 0.0
+    ends = []
+    for sign in (1, -1):
+        place = state.place + sign * 1e-3 * way
+        ends.append(learner.state(place, PULLED, [(None, i.result) for i in both.inners]))
+    difference = (ends[0].residuals - ends[1].residuals) / 2e-3
+    miss = np.linalg.norm(jacobian @ way - difference)
+    assert miss < 0.02 * np.linalg.norm(difference)
+
+
+def test_a_short_step_keeps_what_the_linear_model_promises(learner, state):
+    jacobian, controls = learner.linearised(state)
+    step, promised = learner.step(state, jacobian, 0.05)
+    assert promised < state.objective
+    start = state.inners[0].result.point.controls + (controls[0] @ step).reshape(-1, 35)
+    found = learner.state(state.place + step, PULLED, [(start, state.inners[0].result)])
+    assert found.objective == pytest.approx(promised, rel=0.05)
+    low, high = learner.space.room(state.place)
+    assert ((step >= low - 1e-9) & (step <= high + 1e-9)).all()
+
+
+def test_the_objective_never_rises_within_a_stage(rows):
+    taken = [row for row in rows if row["accepted"]]
+    for one, other in pairwise(taken):
+        same = [one[k] == other[k] for k in ("closeness", "gain", "optima")]
+        assert not all(same) or other["objective"] < one["objective"]
+    assert len(taken) > 5
+
+
+def test_learning_brings_the_optimum_nearer_to_the_motion(made_learning, rows, settings):
+    own = InnerSettings(0.0, settings.round_gain, 300, 1e-6, 1e-2)
+    before = inner_solve(made_learning, made_learning.start, own)
+    before_deg = made_learning.joint_error_deg(before.cost.values.coordinates)
+    assert rows[-1]["closeness"] == 0
+    assert min(row["joint_error_deg"] for row in rows if not row["closeness"]) < 0.8 * before_deg
+
+
+def test_where_the_motion_jumps_a_stage_is_put_between(made_learning, settings, monkeypatch):
+    monkeypatch.setattr(ours, "JUMP", 0.0)  # every stage counts as a jump
+    once = replace(settings, most_between=1, rounds=0, round_steps=0, final_steps=0)
+    stages = [replace(stage, steps=0) for stage in settings.stages]
+    found = ours.learn(made_learning, replace(once, stages=stages), quiet).rows
+    pulls = [row["closeness"] for row in found if row["accepted"]]
+    assert sorted(pulls, reverse=True) == pulls
+    tried = {round(row["closeness"], 6) for row in found}
+    assert round(float(np.sqrt(0.1 * 0.01)), 6) in tried
+
+
+def test_optima_that_have_become_one_are_one(learner, state):
+    twice = learner.judged(state.place, state.style, PULLED, state.inners * 2)
+    assert twice.objective == pytest.approx(state.objective)
+    assert len(ours._distinct(learner, twice, PULLED).inners) == 1
+
+
+def test_a_schedule_that_is_not_there_is_named(shipped):
+    with pytest.raises(MotionStyleError, match="schedule 'ful' is not one of full, quick"):
+        our_settings(shipped, "ful")
