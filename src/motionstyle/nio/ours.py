@@ -30,7 +30,7 @@ from motionstyle.spacetime.solver_point import SolverSettings
 from motionstyle.spacetime.spacetime_problem import COUNT
 from motionstyle.spacetime.starts import perturbed
 
-MOST_REFUSALS = 4  # in a row, then a stage ends
+MOST_REFUSALS = 2  # in a row, then a stage ends: each costs several steps that are taken
 # Of what the linear model promised: above, the next step may be longer; below, it is shorter.
 GOOD_SHARE, POOR_SHARE, MOST_TRUST = 0.6, 0.25, 8.0
 JUMP = 2.0  # of the objective: the pull fell too far at once, X_S went elsewhere
