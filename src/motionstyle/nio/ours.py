@@ -70,22 +70,25 @@ def learn(
     if not settings.stages:
         raise ValueError("the learner needs at least one stage")
     free = Stage(0.0, settings.round_steps, settings.round_gain)
-    ahead = [*settings.stages, free]
-    stage = ahead.pop(0)
+    stage = settings.stages[0]
     state, trust = learner.state(learner.origin, stage, [(None, None)]), 1.0
     record(state, stage, True)
     state, trust = _stage(learner, state, stage, trust, record)
-    between = 0
-    while ahead:
-        found = _followed(learner, state, ahead[0])
-        far = found.objective > JUMP * state.objective
-        record(found, ahead[0], not far)
-        if far and between < settings.most_between:
-            between += 1
-            ahead.insert(0, _halfway(stage, ahead[0]))
-            continue
-        between, stage = 0, ahead.pop(0)
-        state, trust = _stage(learner, found, stage, trust, record)
+    for following in [*settings.stages[1:], free]:
+        for _ in range(settings.most_between):
+            found = _followed(learner, state, following)
+            if found.objective <= JUMP * state.objective:
+                break
+            record(found, following, False)
+            stage = _halfway(stage, following)
+            found = _followed(learner, state, stage)
+            record(found, stage, True)
+            state, trust = _stage(learner, found, stage, trust, record)
+        else:
+            found = _followed(learner, state, following)
+        record(found, following, True)
+        state, trust = _stage(learner, found, following, trust, record)
+        stage = following
     known = 0  # rounds in a row that found nothing new
     for turn in range(settings.rounds):
         rival = _rival(learner, state, free, turn)
