@@ -1,5 +1,7 @@
 """Generated code: the same numbers as the virtual machine, built once, and not needed."""
 
+import platform
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -36,6 +38,20 @@ def test_compiled_code_gives_what_the_virtual_machine_gives(tmp_path):
     np.testing.assert_allclose(fast(x, p)[0][:, 1], x[:, 2] ** 2 - 1)
     rows, columns = fast.pattern(1)
     assert list(zip(rows, columns, strict=True)) == [(0, 0), (0, 1), (1, 2)]
+
+
+@needs_compiler
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="these options are of x86")
+@pytest.mark.parametrize(("without", "lanes"), [("-mno-avx512f", (2, 4)), ("-mno-avx", (2,))])
+def test_narrower_processors_get_the_same_numbers(tmp_path, monkeypatch, without, lanes):
+    monkeypatch.setattr(codegen, "FLAGS", (*codegen.FLAGS, without))
+    narrow = codegen.load_functions(functions, compiled(tmp_path, []))["small"]
+    slow = codegen.load_functions(functions, None)["small"]
+    assert narrow.lanes in lanes
+    for frames in (1, 2, 5, 9):  # more and fewer than lanes
+        x = np.random.default_rng(frames).standard_normal((frames, 3))
+        for one, other in zip(narrow(x, np.ones(2)), slow(x, np.ones(2)), strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-14)
 
 
 @needs_compiler
