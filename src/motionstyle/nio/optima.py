@@ -17,7 +17,6 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from motionstyle.body.layout import JOINT_COORDINATES
-from motionstyle.dynamics.passive import SIGMOID_GAIN
 from motionstyle.nio.derivatives import SIZE, energy_by_style, joint_response
 from motionstyle.nio.inner import Inner, InnerSettings, inner_solve
 from motionstyle.nio.learning_problem import Cost, LearningProblem, target_cost
@@ -78,13 +77,13 @@ class OurSettings:
     usable: float
     damping: float
     least_gain: float
-    most_between: int = 3
-    rounds: int = 0
-    round_steps: int = 0
-    round_gain: float = SIGMOID_GAIN
-    most_optima: int = 3
-    new_deg: float = 2.0
-    final_steps: int = 0
+    most_between: int
+    rounds: int
+    round_steps: int
+    round_gain: float
+    most_optima: int
+    new_deg: float
+    final_steps: int
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,12 @@ class State:
     @property
     def lowest(self) -> Inner:
         """The optimum of least cost, to the best of our knowledge X_S."""
-        return min(self.inners, key=lambda inner: inner.cost.total)
+        return lowest_of(self.inners)
+
+
+def lowest_of(inners: Sequence[Inner]) -> Inner:
+    """Return the optimum of least cost."""
+    return min(inners, key=lambda inner: inner.cost.total)
 
 
 class Learner:
@@ -152,15 +156,19 @@ class Learner:
         """Return the state at y with its residuals, of optima that are known."""
         settings = self.settings
         target = target_cost(self.learning, style, stage.gain)
-        share = self.degrees / np.sqrt(len(inners))
+        share = self._share(len(inners))
         away = [inner.cost.values.coordinates - self.learning.coordinates for inner in inners]
-        lowest = min(inners, key=lambda inner: inner.cost.total)
+        lowest = lowest_of(inners)
         parts = [
             *(share * one[:, JOINT_COORDINATES].ravel() for one in away),
             np.sqrt(settings.prior_weight) * (place - self.origin),
             [np.sqrt(settings.gap_weight * self._gap(lowest, target))],
         ]
         return State(place, style, tuple(inners), target, np.concatenate(parts))
+
+    def _share(self, optima: int) -> float:
+        """Return what makes one optimum's joint errors (rad) residuals of the mean, degrees."""
+        return float(self.degrees / np.sqrt(optima))
 
     @staticmethod
     def _gap(inner: Inner, target: Cost) -> float:
@@ -186,7 +194,7 @@ class Learner:
         by_style = (at_target - at_synth) / total - gap * at_target / total**2
         root = np.sqrt(self.settings.gap_weight * self._gap(lowest, state.target))
         rows = [
-            *(self.degrees / np.sqrt(len(moved)) * by_joints for by_joints, _controls in moved),
+            *(self._share(len(moved)) * by_joints for by_joints, _controls in moved),
             np.sqrt(self.settings.prior_weight) * np.eye(SIZE),
             (0.5 * self.settings.gap_weight / root * (by_style @ chain))[None],
         ]
@@ -208,7 +216,7 @@ class Learner:
         high = np.maximum(np.minimum(high, longest), 1e-12)
         found = lsq_linear(root, wanted, bounds=(low, high)).x
         count = len(state.residuals) - SIZE - 1
-        share = self.degrees / np.sqrt(len(state.inners))
+        share = self._share(len(state.inners))
         farthest_deg = float(np.degrees(np.abs(jacobian[:count] @ found).max() / share))
         found *= min(1.0, trust * self.settings.farthest_deg / max(farthest_deg, 1e-12))
         return found, float(((state.residuals + jacobian @ found) ** 2).sum())

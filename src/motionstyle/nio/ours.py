@@ -38,6 +38,9 @@ FREE_RATIO = 16.0  # κ = 0 counts as that much less than the last κ where one 
 AWAY_SEED = 1000  # of the noise that every second round starts from; judging has other seeds
 
 
+_Record = Callable[[State, Stage, bool], None]
+
+
 def learn(
     learning: LearningProblem,
     settings: OurSettings,
@@ -70,10 +73,22 @@ def learn(
     if not settings.stages:
         raise ValueError("the learner needs at least one stage")
     free = Stage(0.0, settings.round_steps, settings.round_gain)
+    state, trust = _released(learner, free, record)
+    state, trust = _rounds(learner, state, free, trust, record)
+    final = Stage(0.0, settings.final_steps, SIGMOID_GAIN)
+    state = _followed(learner, state, final)
+    record(state, final, True)
+    state, trust = _stage(learner, state, final, trust, record)
+    return learnt(learning, "ours", state.style, state.lowest, rows)
+
+
+def _released(learner: Learner, free: Stage, record: _Record) -> tuple[State, float]:
+    """Return the state at κ = 0, reached through all stages, and the trust to go on with."""
+    settings = learner.settings
     stage = settings.stages[0]
-    state, trust = learner.state(learner.origin, stage, [(None, None)]), 1.0
+    state = learner.state(learner.origin, stage, [(None, None)])
     record(state, stage, True)
-    state, trust = _stage(learner, state, stage, trust, record)
+    state, trust = _stage(learner, state, stage, 1.0, record)
     for following in [*settings.stages[1:], free]:
         for _ in range(settings.most_between):
             found = _followed(learner, state, following)
@@ -89,8 +104,18 @@ def learn(
         record(found, following, True)
         state, trust = _stage(learner, found, following, trust, record)
         stage = following
-    known = 0  # rounds in a row that found nothing new
-    for turn in range(settings.rounds):
+    return state, trust
+
+
+def _rounds(
+    learner: Learner, state: State, free: Stage, trust: float, record: _Record
+) -> tuple[State, float]:
+    """Return the state after optima that own ways lead to were brought to X_T too, and the trust.
+
+    Rounds end where neither kind of start finds anything new.
+    """
+    known = 0
+    for turn in range(learner.settings.rounds):
         rival = _rival(learner, state, free, turn)
         if rival is None:
             known += 1
@@ -99,16 +124,12 @@ def learn(
             continue
         known = 0
         others = state.inners[1:]
-        kept = others[max(0, len(others) - settings.most_optima + 2) :]
+        kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
         optima = [state.inners[0], *kept, rival]
         state = learner.judged(state.place, state.style, free, optima)
         record(state, free, True)
         state, trust = _stage(learner, state, free, 1.0, record)
-    final = Stage(0.0, settings.final_steps, SIGMOID_GAIN)
-    state = _followed(learner, state, final)
-    record(state, final, True)
-    state, trust = _stage(learner, state, final, trust, record)
-    return learnt(learning, "ours", state.style, state.lowest, rows)
+    return state, trust
 
 
 def _halfway(stage: Stage, following: Stage) -> Stage:
@@ -118,11 +139,13 @@ def _halfway(stage: Stage, following: Stage) -> Stage:
 
 
 def _followed(learner: Learner, state: State, stage: Stage) -> State:
-    """Return the state of the same θ in another stage, its optima followed there."""
+    """Return the state of the same θ in another stage, its optima followed there.
+
+    Where that fails only the optimum that is found from X_T is left.
+    """
     found = learner.state(state.place, stage, [(None, i.result) for i in state.inners])
     if learner.usable(found):
         return found
-    # From a neighbour it failed: X_T itself is the safest start there is.
     return learner.state(state.place, stage, [(learner.learning.controls, None)])
 
 
@@ -152,7 +175,7 @@ def _stage(
     state: State,
     stage: Stage,
     trust: float,
-    record: Callable[[State, Stage, bool], None],
+    record: _Record,
 ) -> tuple[State, float]:
     """Return the best state of one stage, and the trust to go on with."""
     jacobian, controls = learner.linearised(state)
