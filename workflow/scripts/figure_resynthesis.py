@@ -25,7 +25,7 @@ with job(snakemake.log[0]):
         motions.append(motion)
         titles.append(f"{kind.replace('_', ' ')}: {row['joint_rms_deg']:.1f}° ({row['status']})")
     if motions:
-        figure = strip_figure(motions, titles, view="travel", forces=True)
+        figure = strip_figure(motions, titles, view="travel", forces=True, paired=True)
     else:
         figure = blank_figure("no style was judged, see the log")
     save(figure, Path(snakemake.output.svg).with_suffix(""))

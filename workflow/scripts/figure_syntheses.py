@@ -1,4 +1,4 @@
-"""Draw synthesised motions as strips with their contact forces, one of each task."""
+"""Draw synthesised or warped motions as strips, with contact forces if known, one of each task."""
 
 from pathlib import Path
 
@@ -10,8 +10,9 @@ from motionstyle.motion.storage import load_available
 with job(snakemake.log[0]):
     motions = load_available(snakemake.input.motions, allow_none=True)
     titles = [
-        f"{m.id}: {m.provenance['task'].replace('_', ' ')}, style {m.provenance['style']} "
-        f"({m.provenance['solver_status']})"
+        f"{m.id}: {m.provenance['task'].replace('_', ' ')}, "
+        + (f"style {m.provenance['style']} " if m.kind == "nio" else "warped example ")
+        + f"({m.provenance['solver_status']})"
         for m in motions
     ]
     if motions:

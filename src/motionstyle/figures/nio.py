@@ -73,6 +73,7 @@ def segment_figure(segments: Mapping[str, Curve], title: str) -> Figure:
         for place, value, text in ((0, 1, "$X_T$"), (1, end / start, "$X_S$")):
             axis.annotate(text, (place, value), xytext=(4, -9), textcoords="offset points")
         axis.set_yscale("log")
+        axis.margins(y=0.1)
         axis.set_title(f"{name} learning: drop {1 - end / start:.2f} of $E(X_T)$")
         axis.set_xlabel("s, share of the way from $X_T$ to $X_S$")
     axes[0].set_ylabel("over the value at $X_T$")

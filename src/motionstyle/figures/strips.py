@@ -34,12 +34,14 @@ Array = NDArray[np.float64]
 SPACING_SHARE, SPACING_M = 0.55, 0.45
 IN_TIME_SPACING_M = 0.6
 LONGEST_M = 6.6  # of travel drawn; what comes later is left out and the title says so
-HARDLY_TRAVELS_M = 1.5  # below this the figures are pushed apart with time
+HARDLY_TRAVELS_M = 1.5  # below this, or slower, the figures are pushed apart with time
+SLOW_M_PER_S = 0.5
 FORCE_SCALE_M = 0.5  # length of an arrow of one body weight
 GRAVITY = 9.81
+LABEL_M = 0.35  # figures that stand closer have their times on two lines
 MARGIN_IN = 0.7  # beside a strip, for its labels
 SHORT_TITLE = 46  # letters of a line above half a page
-SHORT_SHARE = 0.65  # of the widest strip: shorter ones may share a row
+SHORT_M = 4.2  # strips that are no wider may share a row
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ def plan_strip(motion: Motion, across: Array, width: float, count: int | None) -
     forward = across - across[0]
     travelled = float(np.ptp(forward))
     crowded = count is not None and travelled < (count - 1) * SPACING_M / 2
-    in_time = crowded or travelled < HARDLY_TRAVELS_M
+    slow = travelled < SLOW_M_PER_S * motion.times[-1]
+    in_time = crowded or slow or travelled < HARDLY_TRAVELS_M
     beyond = np.flatnonzero(np.abs(forward) > LONGEST_M)
     last = int(beyond[0]) - 1 if len(beyond) and not in_time else motion.frames - 1
     if count is None:
@@ -101,8 +104,8 @@ def stick_strip(
     title : by default the motion's id; planted motions are marked. paths : draw the streamers.
     forces : draw each foot's contact force, where known, from its centre of pressure.
 
-    Figures stand where the motion was, or, if it travels less than 1.5 m, are pushed to the
-    right in proportion to time. The time of each stands below it.
+    Figures stand where the motion was, or, if it travels less than 1.5 m or slower than 0.5 m/s,
+    are pushed to the right in proportion to time. The time of each stands below it.
     """
     points = named_points(motion.body, motion.coordinates)
     points["ground"] = points["pelvis"] * [1, 0, 1]
@@ -190,10 +193,14 @@ def _label(
         axes.plot(*flat["ground"][: strip.last_frame + 1].T, color=GROUND, linewidth=0.6, zorder=0)
     else:
         axes.plot([left - 0.15, right + 0.15], [0.0, 0.0], color=GROUND, linewidth=0.6, zorder=0)
-    for f in strip.frames:
+    before = -np.inf
+    for f in sorted(strip.frames, key=lambda f: flat["pelvis"][f, 0]):
+        place = flat["pelvis"][f, 0]
+        lower = place - before < LABEL_M
+        before = -np.inf if lower else place
         axes.text(
-            flat["pelvis"][f, 0],
-            low - 0.05,
+            place,
+            low - (0.17 if lower else 0.05),
             f"{f / motion.rate_hz:.2f}",
             ha="center",
             va="top",
@@ -261,18 +268,18 @@ def fit_strips(
     extents = [(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())) for axes in grid]
     widest = max(width for width, _height in extents)
     scale = (PRINT_WIDTH_IN - MARGIN_IN) / widest  # inches of paper per metre
-    short = [width for width, _height in extents if width <= SHORT_SHARE * widest]
-    half = max(short, default=0.0) if paired else 0.0
-    if len(short) > 1 and paired:
+    short = [width for width, _height in extents if width <= SHORT_M] if paired else []
+    half = max(short, default=0.0)
+    if len(short) > 1:
         scale = min(scale, (PRINT_WIDTH_IN / 2 - MARGIN_IN) / half)
     widest = (PRINT_WIDTH_IN - MARGIN_IN) / scale
     rows = _rows([width for width, _height in extents], half)
     heights = [max(extents[k][1] for k in row) * scale + 0.65 for row in rows]
     figure.set_size_inches(PRINT_WIDTH_IN, sum(heights) + 0.35)
     places = figure.add_gridspec(len(rows), 2, height_ratios=heights)
-    for row, at in zip(rows, range(len(rows)), strict=True):
+    for at, row in enumerate(rows):
         for column, k in enumerate(row):
-            alone = extents[k][0] > half or not paired
+            alone = extents[k][0] > half
             grid[k].set_subplotspec(places[at, :] if alone else places[at, column])
             left, right = grid[k].get_xlim()
             room = widest if alone else half
