@@ -295,13 +295,6 @@ def test_unwritable_cache_does_not_stop_the_fetch(server, fetch, tmp_path):
     assert any(line.startswith("not kept in the cache") for line in fetch.lines)
 
 
-def test_cache_folder_follows_the_environment(monkeypatch, tmp_path):
-    monkeypatch.setenv("MOTIONSTYLE_CACHE", str(tmp_path / "mine"))
-    assert doors.cache_folder() == tmp_path / "mine"
-    monkeypatch.delenv("MOTIONSTYLE_CACHE")
-    assert doors.cache_folder().name == "motionstyle"
-
-
 # --- the table of datasets -----------------------------------------------------------------
 
 

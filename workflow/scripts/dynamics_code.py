@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from motionstyle.cache import cache_folder
 from motionstyle.dynamics.codegen import compile_library
 from motionstyle.dynamics.functions import dynamics_functions
 from motionstyle.dynamics.second_order import second_order_functions
 from motionstyle.jobs import job
-from motionstyle.mocap.datasets.doors import cache_folder
 
 with job(snakemake.log[0]):
     output, cache = snakemake.output, Path(cache_folder())

@@ -1,7 +1,8 @@
 """Fetch one file of a dataset from the cache, a mirror folder or upstream."""
 
+from motionstyle.cache import cache_folder
 from motionstyle.jobs import job
-from motionstyle.mocap.datasets.doors import DatasetFile, cache_folder, fetch_file
+from motionstyle.mocap.datasets.doors import DatasetFile, fetch_file
 
 with job(snakemake.log[0]):
     fetch_file(

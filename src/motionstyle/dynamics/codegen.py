@@ -65,42 +65,55 @@ def compile_library(
     MotionStyleError
         If there is a compiler and it fails.
     """
-    source = generate_source(functions)
     compiler = find_compiler()
     if compiler is None:
         log("no C compiler found: the virtual machine serves, some 20 times slower")
         write_json(destination, {"library": None, "compiler": None, "functions": {}})
         return
-    version = subprocess.run(
-        [compiler, "-march=native", "-Q", "--help=target", "--version"],
-        capture_output=True, text=True, check=False,
-    ).stdout  # fmt: skip
-    digest = sha256("\0".join([source, version, *FLAGS]).encode()).hexdigest()
-    library = cache / "code" / f"{digest[:32]}.so"
-    if library.exists():
-        log(f"compiled before: {library.name}")
-    else:
-        log(f"compiling {len(source) / 1e6:.1f} MB of C with {compiler} {' '.join(FLAGS)}")
-        with tempfile.TemporaryDirectory() as folder:
-            file, built = Path(folder) / "functions.c", Path(folder) / "functions.so"
-            file.write_text(source, encoding="utf-8")
-            done = subprocess.run(
-                [compiler, *FLAGS, str(file), "-o", str(built), "-lm"],
-                capture_output=True, text=True, check=False,
-            )  # fmt: skip
-            if done.returncode:
-                raise MotionStyleError(
-                    f"the C compiler {compiler} failed ({done.stderr.strip()[-300:]}); mend it, or "
-                    "run with CC= and no cc on the PATH to do without"
-                )
-            with atomic_write(library, "wb") as handle:
-                handle.write(built.read_bytes())
-        library.chmod(0o755)
-        log(f"built {library.name}")
+    library = compile_source(generate_source(functions), FLAGS, compiler, cache, log)
     signatures = {function.name(): asdict(Signature.of(function)) for function in functions}
     write_json(
         destination, {"library": str(library), "compiler": compiler, "functions": signatures}
     )
+
+
+def compile_source(
+    source: str, flags: Sequence[str], compiler: str, cache: Path, log: Callable[[str], None]
+) -> Path:
+    """Return the shared library made of C, from the cache if it was built there before.
+
+    Raises
+    ------
+    MotionStyleError
+        If the compiler fails.
+    """
+    version = subprocess.run(
+        [compiler, "-march=native", "-Q", "--help=target", "--version"],
+        capture_output=True, text=True, check=False,
+    ).stdout  # fmt: skip
+    digest = sha256("\0".join([source, version, *flags]).encode()).hexdigest()
+    library = cache / "code" / f"{digest[:32]}.so"
+    if library.exists():
+        log(f"compiled before: {library.name}")
+        return library
+    log(f"compiling {len(source) / 1e6:.2g} MB of C with {compiler} {' '.join(flags)}")
+    with tempfile.TemporaryDirectory() as folder:
+        file, built = Path(folder) / "functions.c", Path(folder) / "functions.so"
+        file.write_text(source, encoding="utf-8")
+        done = subprocess.run(
+            [compiler, *flags, str(file), "-o", str(built), "-lm"],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            raise MotionStyleError(
+                f"the C compiler {compiler} failed ({done.stderr.strip()[-300:]}); mend it, or "
+                "run with CC= and no cc on the PATH to do without"
+            )
+        with atomic_write(library, "wb") as handle:
+            handle.write(built.read_bytes())
+    library.chmod(0o755)
+    log(f"built {library.name}")
+    return library
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,6 @@ from scipy.linalg.lapack import dpbtrf, dpbtrs
 from motionstyle.spacetime.splines import SplineBasis
 
 Array = NDArray[np.float64]
-_LEFT, _RIGHT = np.triu_indices(4)  # pairs of the control points alive at a frame
-_STARTS = (0, 4, 7, 9, 10)  # where pairs begin, by the first of the two
 
 
 @dataclass(frozen=True)
@@ -26,6 +24,11 @@ class BandedHessian:
 
     band: Array
     size: int
+
+    @staticmethod
+    def of(blocks: Array) -> BandedHessian:
+        """Return the matrix whose block of control points k and k + e is blocks[k, e], (n, n)."""
+        return BandedHessian(_laid_out(blocks), blocks.shape[2])
 
     def factor(self, added: Array | float = 0.0) -> Array | None:
         """Return the Cholesky factor of matrix + diag(added), or None if it is not positive."""
@@ -46,50 +49,6 @@ def solve(factor: Array, right: Array, columns: bool = False) -> Array:
     return found.reshape(right.shape)
 
 
-class BandAssembly:
-    """Adds up Σ_t Φ_tᵀ H_t Φ_t of symmetric H (3n, 3n) over (q, q̇, q̈), frame by frame.
-
-    One frame at a time stays within the processor's cache.
-    """
-
-    def __init__(self, basis: SplineBasis, size: int) -> None:
-        self.first, self.size = basis.first.tolist(), size
-        self._pairs = np.ascontiguousarray(_pair_weights(basis))
-        # Of each control point with itself and the next three; all others follow by symmetry.
-        self._blocks = np.zeros((basis.controls, 4, size * size))
-        self._split = np.empty((3, 3, size, size))
-        self._local = np.empty((10, size * size))
-
-    def add(self, frame: int, hessian: Array) -> None:
-        """Add a frame's Hessian (3n, 3n)."""
-        n, first, local = self.size, self.first[frame], self._local
-        self._split[...] = hessian.reshape(3, n, 3, n).swapaxes(1, 2)
-        np.matmul(self._pairs[frame], self._split.reshape(9, n * n), out=local)
-        for c in range(4):
-            self._blocks[first + c, : 4 - c] += local[_STARTS[c] : _STARTS[c + 1]]
-
-    def whole(self) -> BandedHessian:
-        """Return the sum."""
-        n = self.size
-        return BandedHessian(_laid_out(self._blocks.reshape(-1, 4, n, n)), n)
-
-
-def assemble_hessian(basis: SplineBasis, hessians: Array) -> BandedHessian:
-    """Return Σ_t Φ_tᵀ H_t Φ_t of symmetric H (F, 3n, 3n) over (q, q̇, q̈)."""
-    assembly = BandAssembly(basis, hessians.shape[1] // 3)
-    for t, hessian in enumerate(hessians):
-        assembly.add(t, hessian)
-    return assembly.whole()
-
-
-def _pair_weights(basis: SplineBasis) -> Array:
-    """Return w_dc w_d'c' of the control points c ≤ c' of a frame, (F, 10, 9)."""
-    weights = basis.weights
-    left, right = weights[:, :, _LEFT], weights[:, :, _RIGHT]
-    products = left[:, :, None] * right[:, None]
-    return products.reshape(len(weights), 9, -1).swapaxes(1, 2)
-
-
 def _laid_out(blocks: Array) -> Array:
     """Return a lower band, (4n, K·n), Fortran order, from blocks (K, 4, n, n).
 
@@ -103,8 +62,8 @@ def _laid_out(blocks: Array) -> Array:
     # diagonal would come to lie in the column before.
     step = store.itemsize
     strides = (step * height * n, step * (height - 1), step)
-    blocks[:, 0] = np.tril(blocks[:, 0].swapaxes(1, 2)).swapaxes(1, 2)
-    for e in range(4):
+    as_strided(store, (controls, n, n), strides)[...] = np.triu(blocks[:, 0])
+    for e in range(1, 4):
         as_strided(store[e * n :], (controls, n, n), strides)[...] = blocks[:, e]
     return store.reshape(controls * n, height).T
 

@@ -8,10 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motionstyle.spacetime.banded import assemble_gradient
+from motionstyle.spacetime.frame_sums import FrameSums
 from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
 from motionstyle.spacetime.spacetime_problem import COUNT, Evaluator, Slopes, Values
+from motionstyle.spacetime.splines import SplineBasis
 
 Array = NDArray[np.float64]
+
+
+METRIC = np.array([1.0, 1e-2, 1e-4])  # of q, q̇, q̈ where curvature must be added
 
 
 class BarrierProblem:
@@ -19,7 +24,9 @@ class BarrierProblem:
 
     Attributes
     ----------
-    bearing : coefficients λ that may push, (F, 32), and bearing_at : their indices by frame.
+    bearing : coefficients λ that may push, (F, 32). sums : over frames, for Newton's matrix.
+    metric : Σ_t Φᵀ M Φ of the metric in which curvature is added, by pairs of control points
+        (K, 4), the same for every coordinate.
     active : inequality rows that count, (F, R).
     weight : ρ of each row's elastic part, (R,). force_weight : w_λ per (λ/100 N)².
     fixed : control points that must not move, (K, 35).
@@ -28,7 +35,8 @@ class BarrierProblem:
     def __init__(self, evaluator: Evaluator) -> None:
         self.evaluator = evaluator
         self.bearing = evaluator.bearing
-        self.bearing_at = [np.flatnonzero(row) for row in self.bearing]
+        self.sums = FrameSums(evaluator.basis, self.bearing)
+        self.metric = _metric(evaluator.basis)
         self.active = evaluator.row_active
         self.weight = evaluator.row_weight
         self.force_weight = evaluator.problem.settings.force_weight * FORCE_UNIT**2
@@ -119,3 +127,12 @@ class BarrierProblem:
             np.abs(gaps - barrier).max(initial=0.0) / scale_gap,
         ]
         return float(max(parts))
+
+
+def _metric(basis: SplineBasis) -> Array:
+    found = np.zeros((basis.controls, 4))
+    for c in range(4):
+        for e in range(4 - c):
+            products = basis.weights[:, :, c] * basis.weights[:, :, c + e]
+            np.add.at(found[:, e], basis.first + c, products @ METRIC)
+    return found

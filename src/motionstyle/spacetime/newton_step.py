@@ -6,32 +6,30 @@ eliminates λ and finds the least δ that makes the matrix convex, `newton_step`
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.spacetime.banded import BandAssembly, assemble_gradient, solve, spread
+from motionstyle.spacetime.banded import BandedHessian, assemble_gradient, solve, spread
 from motionstyle.spacetime.barrier_problem import BarrierProblem
-from motionstyle.spacetime.elimination import Eliminated, eliminate
+from motionstyle.spacetime.frame_sums import Eliminated
 from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
 from motionstyle.spacetime.spacetime_problem import COUNT, Slopes, Values
 
 Array = NDArray[np.float64]
-METRIC = np.repeat([1.0, 1e-2, 1e-4], COUNT)  # of q, q̇, q̈ where curvature must be added
-
 RIGID = 1e20  # what holds fixed control points: far above the largest curvature, some 1e11
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """Per-frame parts of the Newton system: exact curvature and Gauss–Newton parts apart.
+    """Parts of the Newton system: exact curvature and Gauss–Newton parts apart.
 
     Attributes
     ----------
-    curved, gauss : over u, (F, 105, 105). mixed_gauss : λ × u, (F, 32, 105). mixed_curved : λ × q,
-        (F, 32, 35), as forces enter the dynamics by place alone.
+    curved, gauss : over the control points, in blocks (K, 4, 36, 40), see `frame_sums`.
+    mixed_gauss : λ × u, (F, 32, 105). mixed_curved : λ × q, (F, 32, 35), as forces enter the
+        dynamics by place alone.
     inner_gauss : over λ, (F, 32, 32), and inner_diagonal (F, 32) of the barrier and w_λ.
     track_pull : ∂φ/∂q of the tracking term, (F, 35).
     force_pull : ∂φ/∂λ without residuals, (F, 32). by_force : ∂r/∂λ, (F, 35, 32), per 100 N.
@@ -74,9 +72,9 @@ def newton_blocks(
     bend, mixed = evaluator.curvature(
         values, slopes, point.multiplier, point.foot_multiplier, pushes
     )
-    turned = np.swapaxes(by_state, 1, 2)
-    gauss = turned @ by_state
-    gauss[:, q, q] += np.swapaxes(slopes.feet, 1, 2) @ slopes.feet
+    gauss, curved = system.sums.nothing(), system.sums.nothing()
+    system.sums.add_products(by_state, gauss)
+    system.sums.add_products(slopes.feet, gauss)
     # Inequalities have the stiffness w/(s + w/ρ).
     firm = point.slack + point.row_dual / system.weight
     stiff = np.where(system.active, point.row_dual / firm, 0.0)
@@ -88,11 +86,12 @@ def newton_blocks(
     if tracking is not None:
         joints = np.arange(COUNT)
         bend[:, joints, joints] += tracking.weights
+    system.sums.add_matrices(bend, curved)
     safe = np.where(system.bearing, point.coefficients, 1.0)
     pull = np.where(system.bearing, system.force_weight * point.coefficients - barrier / safe, 0.0)
     return Blocks(
         barrier=barrier,
-        curved=bend,
+        curved=curved,
         gauss=gauss,
         mixed_curved=FORCE_UNIT * np.ascontiguousarray(np.swapaxes(mixed[:, q], 1, 2)),
         mixed_gauss=np.swapaxes(by_force, 1, 2) @ by_state,
@@ -134,34 +133,19 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     δ is added on all unknowns: on the copies of residuals it means (1 + δ) JᵀJ, a metric in
     which the valleys of E are not narrow.
     """
-    more = 1 + delta
-    inner = more * blocks.inner_gauss
-    _diagonal(inner)[...] += blocks.inner_diagonal + delta
-    cross = more * blocks.mixed_gauss
-    cross[:, :, :COUNT] += blocks.mixed_curved
-    assembly = BandAssembly(system.evaluator.basis, COUNT)
-    eliminated = eliminate(
-        _hessians(blocks, delta), inner, np.swapaxes(cross, 1, 2), system.bearing_at, assembly.add
+    total = (1 + delta) * blocks.gauss
+    total += blocks.curved
+    eliminated = system.sums.eliminate(
+        total,
+        delta,
+        (blocks.inner_gauss, blocks.inner_diagonal),
+        (blocks.mixed_gauss, blocks.mixed_curved),
     )
+    total = total[:, :, :COUNT, :COUNT]
+    np.einsum("...ii->...i", total)[...] += delta * system.metric[..., None]
     fixed = np.where(system.fixed, RIGID, 0.0).ravel()
-    factor = assembly.whole().factor(fixed + delta)
+    factor = BandedHessian.of(total).factor(fixed + delta)
     return None if factor is None else Factor(factor, eliminated, delta)
-
-
-def _hessians(blocks: Blocks, delta: float) -> Iterator[Array]:
-    """Yield each frame's Hessian over u at δ, (105, 105), always in the same memory."""
-    hessian = np.empty_like(blocks.gauss[0])
-    added, diagonal = delta * METRIC, _diagonal(hessian)
-    for gauss, curved in zip(blocks.gauss, blocks.curved, strict=True):
-        np.multiply(gauss, 1 + delta, out=hessian)
-        hessian += curved
-        diagonal += added
-        yield hessian
-
-
-def _diagonal(matrices: Array) -> Array:
-    """Return a view of the diagonals (..., n) of matrices (..., n, n)."""
-    return np.einsum("...ii->...i", matrices)
 
 
 def newton_step(
@@ -182,7 +166,7 @@ def newton_step(
     pull = np.vecmat(lift, blocks.by_force) + blocks.force_pull
     eliminated = factor.eliminated
     answer = eliminated.forward(pull[..., None])
-    gradient -= (eliminated.half.swapaxes(1, 2) @ answer)[..., 0]
+    gradient -= np.vecmat(answer[..., 0], eliminated.half)
     right = -assemble_gradient(basis, gradient)
     right[system.fixed] = 0.0
     moved = solve(factor.factor, right)

@@ -29,6 +29,7 @@ from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.foot_constraints import FootConstraints
 from motionstyle.spacetime.forces import cone_basis
+from motionstyle.spacetime.frame_sums import scatter
 from motionstyle.spacetime.splines import SplineBasis
 from motionstyle.spacetime.style import Style
 
@@ -137,9 +138,9 @@ def _places(rows: NDArray[np.int64], columns: NDArray[np.int64], wide: int) -> N
 
 def _filled(numbers: Array, places: NDArray[np.int64], rows: int, columns: int) -> Array:
     """Return matrices (F, rows, columns) with numbers (F, n) at places (n,), else 0."""
-    found = np.zeros((len(numbers), rows * columns))
-    found[:, places] = numbers
-    return found.reshape(len(numbers), rows, columns)
+    found = np.zeros((len(numbers), rows, columns))
+    scatter(numbers, places, found)
+    return found
 
 
 class Evaluator:
@@ -284,7 +285,7 @@ class Evaluator:
         frames = self.problem.frames
         by_state = np.zeros((frames, COUNT, 3 * COUNT))
         for places, part in zip(self.slope_places, found[1:4], strict=True):
-            by_state.reshape(frames, -1)[:, places] = part
+            scatter(part, places, by_state)
         by_force = _filled(found[4], self.force_places, COUNT, 3 * POINTS)
         given = self.problem.functions["foot_points"](values.coordinates, self.parameters)[1]
         points = _filled(given, self.point_places, 3 * POINTS, COUNT)
@@ -329,7 +330,7 @@ class Evaluator:
         )
         hessian = np.zeros((frames, 3 * COUNT, 3 * COUNT))
         for places in self.curvature_places:
-            hessian.reshape(frames, -1)[:, places] = found
+            scatter(found, places, hessian)
         cross = _filled(crossed, self.cross_places, 3 * POINTS, COUNT)
         pull = (weights[:, None] @ slopes.by_force).reshape(frames, POINTS, 3)
         _force, by_height, by_height2 = self._shoe(values.points)
@@ -341,7 +342,7 @@ class Evaluator:
         )[0]
         point_part = np.zeros((frames, COUNT, COUNT))
         for places in self.bend_places:
-            point_part.reshape(frames, -1)[:, places] = bent
+            scatter(bent, places, point_part)
         if self.problem.style.shoe_stiffness > 0:
             by_normal = (self.heights_of @ cross) * by_height[..., None]
             mixed = np.swapaxes(by_normal, 1, 2) @ slopes.heights

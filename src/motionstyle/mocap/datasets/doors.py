@@ -7,7 +7,6 @@ imported by several hundred tiny jobs and therefore imports little.
 from __future__ import annotations
 
 import csv
-import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 
 Log = Callable[[str], None]
 
-CACHE_VARIABLE = "MOTIONSTYLE_CACHE"
 UPSTREAM = "https://raw.githubusercontent.com/{repository}/{commit}/{upstream_path}"
 DATASET_COLUMNS = (
     "dataset",
@@ -72,15 +70,6 @@ class FetchRecord:
     location: str
     sha256: str
     failures: tuple[tuple[str, str], ...]
-
-
-def cache_folder() -> Path:
-    """Return the user's cache folder: `$MOTIONSTYLE_CACHE`, or the platform's own place."""
-    if chosen := os.environ.get(CACHE_VARIABLE):
-        return Path(chosen).expanduser()
-    from platformdirs import user_cache_dir  # noqa: PLC0415 - only when it is needed
-
-    return Path(user_cache_dir("motionstyle", appauthor=False))
 
 
 def cached_file(cache_dir: str | Path, checksum: str) -> Path:
