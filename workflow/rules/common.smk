@@ -218,7 +218,7 @@ def room_digest(room):
     """Return a digest of the sources of one room, or one module, of the package."""
     digest = sha256()
     files = [PACKAGE / room] if room.endswith(".py") else (PACKAGE / room).rglob("*")
-    for file in sorted(f for f in files if f.suffix in {".py", ".j2"}):
+    for file in sorted(f for f in files if f.suffix in {".py", ".c", ".j2"}):
         if room or file.parent == PACKAGE:
             digest.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
     return digest.hexdigest()
