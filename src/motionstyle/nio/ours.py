@@ -7,8 +7,9 @@ the last one's θ, with stages between where X_S jumps; only κ = 0 is NIO's own
 from making X_T's torques small instead of optimal. Springs are gentler (gain 60/rad) here.
 
 Close to X_T the solver follows an optimum that need not be the only one. So rounds follow, on the
-problem itself: a solve goes its own way, from X_T or from a motion away from it, and where it ends
-elsewhere (a counterexample to θ), both optima are brought to X_T together from there on.
+problem itself: a solve goes its own way from X_T, and where it ends elsewhere (a counterexample to
+θ), both optima are brought to X_T together from there on. The θ of the round whose optima, that one
+included, came closest is the one that is learnt.
 """
 
 from __future__ import annotations
@@ -28,14 +29,12 @@ from motionstyle.nio.optima import Learner, OurSettings, Stage, State
 from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.solver_point import SolverSettings
 from motionstyle.spacetime.spacetime_problem import COUNT
-from motionstyle.spacetime.starts import perturbed
 
 MOST_REFUSALS = 2  # in a row, then a stage ends: each costs several steps that are taken
 # Of what the linear model promised: above, the next step may be longer; below, it is shorter.
 GOOD_SHARE, POOR_SHARE, MOST_TRUST = 0.6, 0.25, 8.0
 JUMP = 2.0  # of the objective: the pull fell too far at once, X_S went elsewhere
 FREE_RATIO = 16.0  # κ = 0 counts as that much less than the last κ where one between is sought
-AWAY_SEED = 1000  # of the noise that every second round starts from; judging has other seeds
 
 
 _Record = Callable[[State, Stage, bool], None]
@@ -110,26 +109,30 @@ def _released(learner: Learner, free: Stage, record: _Record) -> tuple[State, fl
 def _rounds(
     learner: Learner, state: State, free: Stage, trust: float, record: _Record
 ) -> tuple[State, float]:
-    """Return the state after optima that own ways lead to were brought to X_T too, and the trust.
+    """Return the best state of all rounds, and the trust to go on with.
 
-    Rounds end where neither kind of start finds anything new.
+    Every state is held to where a solve of its own leads from X_T: states that look alike from
+    close by differ by ten degrees there. Rounds end where a solve finds nothing new, or does not
+    converge.
     """
-    known = 0
-    for turn in range(learner.settings.rounds):
-        rival = _rival(learner, state, free, turn)
+    best: State | None = None
+    for turn in range(learner.settings.rounds + 1):
+        rival = _rival(learner, state, free)
         if rival is None:
-            known += 1
-            if known == 2:
-                break
-            continue
-        known = 0
-        others = state.inners[1:]
-        kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
-        optima = [state.inners[0], *kept, rival]
-        state = learner.judged(state.place, state.style, free, optima)
-        record(state, free, True)
-        state, trust = _stage(learner, state, free, 1.0, record)
-    return state, trust
+            held = state
+        else:
+            others = state.inners[1:]
+            kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
+            optima = [state.inners[0], *kept, rival]
+            held = learner.judged(state.place, state.style, free, optima)
+            record(held, free, True)
+        if best is None or held.objective < best.objective:
+            best = held
+        learnable = rival is not None and learner.usable(held)
+        if not learnable or turn == learner.settings.rounds:
+            break
+        state, trust = _stage(learner, held, free, 1.0, record)
+    return best, trust
 
 
 def _halfway(stage: Stage, following: Stage) -> Stage:
@@ -149,19 +152,16 @@ def _followed(learner: Learner, state: State, stage: Stage) -> State:
     return learner.state(state.place, stage, [(learner.learning.controls, None)])
 
 
-def _rival(learner: Learner, state: State, stage: Stage, turn: int) -> Inner | None:
+def _rival(learner: Learner, state: State, stage: Stage) -> Inner | None:
     """Return an optimum of the same θ that is none of the known ones, if a solve finds one.
 
-    Even turns start from X_T, odd ones from smooth noise about it, both by way of gentler problems.
+    The solve goes its own way from X_T, through gentler problems.
     """
     learning, settings = learner.learning, learner.settings
     problem = learning.problem(state.style, gain=stage.gain)
-    start = learning.controls
-    if turn % 2:
-        start = problem.basis().fit(perturbed(learning.target, AWAY_SEED + turn).coordinates)
-    solved = solve_spacetime(problem, start, settings=SolverSettings(tolerance=settings.tolerance))
-    if solved.optimality > settings.usable:
-        return None
+    solved = solve_spacetime(
+        problem, learning.controls, settings=SolverSettings(tolerance=settings.tolerance)
+    )
     cost = cost_of_point(problem, solved.point)
     away = [
         joint_rms_deg(cost.values.coordinates, inner.cost.values.coordinates)
