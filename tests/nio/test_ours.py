@@ -103,6 +103,28 @@ def test_where_the_motion_jumps_a_stage_is_put_between(made_learning, settings, 
     assert round(float(np.sqrt(0.1 * 0.01)), 6) in tried
 
 
+@pytest.mark.parametrize(("first_away", "second_away"), [(0.5, 0.1), (0.1, 0.5)])
+def test_the_round_whose_own_solve_came_closest_is_kept(
+    learner, state, settings, monkeypatch, first_away, second_away
+):
+    away = iter([first_away, second_away])
+    moved = learner.judged(state.place + 1e-3, state.style, PULLED, state.inners)
+
+    def rival(_learner, now, _stage):
+        inner = now.inners[0]
+        values = inner.cost.values
+        far = replace(values, coordinates=values.coordinates + next(away))
+        return replace(inner, cost=replace(inner.cost, values=far))
+
+    monkeypatch.setattr(ours, "_rival", rival)
+    monkeypatch.setattr(ours, "_stage", lambda *_: (moved, 1.0))
+    one = Learner(learner.learning, replace(settings, rounds=1))
+    best, _trust = ours._rounds(one, state, PULLED, 1.0, lambda *_: None)
+    kept = moved if second_away < first_away else state
+    np.testing.assert_array_equal(best.place, kept.place)
+    assert len(best.inners) == 2
+
+
 def test_optima_that_have_become_one_are_one(learner, state):
     twice = learner.judged(state.place, state.style, PULLED, state.inners * 2)
     assert twice.objective == pytest.approx(state.objective)
