@@ -115,6 +115,8 @@ def _rounds(
     close by differ by ten degrees there. Rounds end where a solve finds nothing new, or does not
     converge.
     """
+    if not learner.settings.rounds:
+        return state, trust
     best: State | None = None
     for turn in range(learner.settings.rounds + 1):
         rival = _rival(learner, state, free)
