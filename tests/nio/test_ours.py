@@ -31,7 +31,7 @@ def shipped():
 def settings(shipped):
     stages = [PULLED, Stage(0.01, 3, 60.0)]
     found = our_settings(shipped, "quick")
-    return replace(found, stages=stages, round_steps=2, rounds=0, final_steps=1)
+    return replace(found, stages=stages, round_steps=2, rounds=1, final_steps=1)
 
 
 @pytest.fixture(scope="module")

@@ -3,21 +3,28 @@
 import numpy as np
 import pytest
 
-from motionstyle.spacetime import frame_sums
-from motionstyle.spacetime.frame_sums import SIZE, FrameSums, compiled_kernels, scatter
+from motionstyle.spacetime import kernels
+from motionstyle.spacetime.frame_sums import ForceBlocks, FrameSums
+from motionstyle.spacetime.kernels import SIZE, compiled_kernels, scatter
 from motionstyle.spacetime.splines import SplineBasis
 
 FRAMES, WIDE, FORCES = 9, 105, 32
+LEAST = 1e-2  # of λ's diagonal, as the barrier's
+
+
+@pytest.fixture(scope="module")
+def bearing():
+    found = np.random.default_rng(5).random((FRAMES, FORCES)) < 0.6
+    found[1], found[2] = False, True
+    return found
 
 
 @pytest.fixture(scope="module", params=["compiled", "numpy"])
-def sums(request):
-    library = compiled_kernels() if request.param == "compiled" else None
-    if request.param == "compiled" and library is None:
+def sums(request, bearing):
+    compiled = request.param == "compiled"
+    if compiled and compiled_kernels() is None:
         pytest.skip("no C compiler on this machine")
-    bearing = np.random.default_rng(5).random((FRAMES, FORCES)) < 0.6
-    bearing[1], bearing[2] = False, True
-    return FrameSums(SplineBasis.uniform(FRAMES, 30.0, 2.0), bearing, library)
+    return FrameSums(SplineBasis.uniform(FRAMES, 30.0, 2.0), bearing, compiled=compiled)
 
 
 @pytest.fixture(scope="module")
@@ -32,25 +39,28 @@ def design(sums):
     return found
 
 
+def stiff(rows):
+    """Blocks over (u, λ) that λ balances but for a small rest, as it does root rows."""
+    rng = np.random.default_rng(6)
+    found = rng.standard_normal((FRAMES, rows, WIDE + FORCES))
+    found *= 10.0 ** rng.uniform(-1, 2, (rows, 1))
+    found[:, :, SIZE:WIDE] *= np.repeat([1e-2, 1e-4], SIZE)
+    least = LEAST * np.repeat([1.0, 1e-4, 1e-8, 1.0], [SIZE, SIZE, SIZE, FORCES])
+    return np.swapaxes(found, 1, 2) @ found + np.diag(least)
+
+
 @pytest.fixture(scope="module")
 def whole():
-    """Stiff blocks over (u, λ) that λ balances to within a millionth, as root rows are."""
-    rng = np.random.default_rng(6)
-    rows = rng.standard_normal((FRAMES, 40, WIDE + FORCES)) * 10.0 ** rng.uniform(-1, 2, (40, 1))
-    rows[:, :, SIZE:WIDE] *= np.repeat([1e-2, 1e-4], SIZE)
-    return np.swapaxes(rows, 1, 2) @ rows + 1e-2 * np.eye(WIDE + FORCES)
+    return stiff(rows=40)
 
 
 def parts(whole):
-    """λ's blocks as the Newton system has them: Gauss-Newton parts and the rest apart."""
-    inner = np.ascontiguousarray(0.5 * whole[:, WIDE:, WIDE:])
-    diagonal = np.einsum("fii->fi", whole[:, WIDE:, WIDE:]).copy()
-    inner_rest = 0.5 * whole[:, WIDE:, WIDE:] - np.einsum("fi,ij->fij", diagonal, np.eye(FORCES))
+    """λ's blocks as the Newton system has them; together at δ = 0 those of `whole`."""
     mixed = np.ascontiguousarray(np.swapaxes(whole[:, :WIDE, WIDE:], 1, 2))
-    curved = 0.3 * mixed[:, :, :SIZE]
-    gauss = mixed.copy()
-    gauss[:, :, :SIZE] -= curved
-    return (inner, diagonal), inner_rest, (gauss, np.ascontiguousarray(curved))
+    place = 0.3 * mixed[:, :, :SIZE]
+    mixed[:, :, :SIZE] -= place
+    inner = whole[:, WIDE:, WIDE:] - LEAST * np.eye(FORCES)
+    return ForceBlocks(inner, np.full((FRAMES, FORCES), LEAST), mixed, place)
 
 
 def dense_of(blocks):
@@ -85,59 +95,73 @@ def test_matrices_are_the_dense_ones_and_add_up(sums, design):
 
 
 @pytest.mark.parametrize("delta", [0.0, 0.3])
-def test_what_is_left_is_the_schur_complement(sums, design, whole, delta):
-    inner, _rest, mixed = parts(whole)
-    blocks = sums.nothing()
-    found = sums.eliminate(blocks, delta, inner, mixed)
+def test_what_is_taken_out_is_what_dense_algebra_takes(sums, bearing, design, whole, delta):
+    forces, blocks = parts(whole), sums.nothing()
+    found = sums.eliminate(blocks, delta, forces)
     expected = 0.0
-    for t, bears in enumerate(sums.bearing):
+    for t, bears in enumerate(bearing):
         at = np.flatnonzero(bears)
-        own = (1 + delta) * inner[0][t] + np.diag(inner[1][t] + delta)
-        cross = (1 + delta) * mixed[0][t, at]
-        cross[:, :SIZE] += mixed[1][t, at]
+        own = (1 + delta) * forces.inner[t] + np.diag(forces.diagonal[t] + delta)
+        cross = (1 + delta) * forces.mixed[t, at]
+        cross[:, :SIZE] += forces.mixed_place[t, at]
         taken = cross.T @ np.linalg.solve(own[np.ix_(at, at)], cross)
         expected = expected - design[t].T @ taken @ design[t]
-        np.testing.assert_allclose(found.half[t, at].T @ found.half[t, at], taken, rtol=1e-6,
-                                   atol=1e-9 * np.abs(taken).max())  # fmt: skip
-    np.testing.assert_allclose(dense_of(blocks), expected, atol=1e-9 * np.abs(expected).max())
+        most = np.abs(taken).max(initial=0.0)
+        np.testing.assert_allclose(found.half[t, at].T @ found.half[t, at], taken, atol=1e-8 * most)
+    np.testing.assert_allclose(dense_of(blocks), expected, atol=1e-8 * np.abs(expected).max())
     assert not found.half[1].any()
 
 
-def test_the_small_difference_of_large_numbers_keeps_its_curvature(sums, design, whole):
-    # H - C A^-1 C' is a millionth of H: with inverses instead of factors it loses its sign.
-    inner, inner_rest, mixed = parts(whole)
-    whole = whole.copy()
-    whole[:, WIDE:, WIDE:] -= inner_rest  # what parts() leaves out of λ's own block
-    blocks = sums.nothing()
-    sums.add_matrices(np.ascontiguousarray(whole[:, :WIDE, :WIDE]), blocks)
-    sums.eliminate(blocks, 0.0, inner, mixed)
+def schur_complements(bearing, design, whole):
     wanted = 0.0
-    for t, bears in enumerate(sums.bearing):
+    for t, bears in enumerate(bearing):
         index = np.concatenate([np.arange(WIDE), WIDE + np.flatnonzero(bears)])
         inverse = np.linalg.inv(whole[t][np.ix_(index, index)])
         wanted = wanted + design[t].T @ np.linalg.inv(inverse[:WIDE, :WIDE]) @ design[t]
+    return wanted
+
+
+def test_what_is_left_is_the_schur_complement(sums, bearing, design, whole):
+    blocks = sums.nothing()
+    sums.add_matrices(np.ascontiguousarray(whole[:, :WIDE, :WIDE]), blocks)
+    sums.eliminate(blocks, 0.0, parts(whole))
+    wanted = schur_complements(bearing, design, whole)
     np.testing.assert_allclose(
         dense_of(blocks), wanted, rtol=1e-4, atol=1e-4 * np.abs(wanted).max()
     )
 
 
-def test_forward_and_backward_solve_the_inner_blocks(sums, whole):
-    inner, _rest, mixed = parts(whole)
-    found = sums.eliminate(sums.nothing(), 0.2, inner, mixed)
+def test_a_small_difference_of_large_numbers_is_kept(sums, design):
+    # λ can balance all rows, so that less than a ten-thousandth of H is left.
+    every = FrameSums(sums.basis, np.full((FRAMES, FORCES), True), compiled=bool(sums.library))
+    whole = stiff(rows=30)
+    blocks = every.nothing()
+    every.add_matrices(np.ascontiguousarray(whole[:, :WIDE, :WIDE]), blocks)
+    large = np.abs(blocks).max()
+    every.eliminate(blocks, 0.0, parts(whole))
+    wanted = schur_complements(np.full((FRAMES, FORCES), True), design, whole)
+    most = np.abs(wanted).max()
+    assert most < 1e-4 * large
+    np.testing.assert_allclose(dense_of(blocks), wanted, atol=1e-7 * most)  # inverses: 1e-6
+
+
+def test_forward_and_backward_solve_the_inner_blocks(sums, bearing, whole):
+    forces = parts(whole)
+    found = sums.eliminate(sums.nothing(), 0.2, forces)
     right = np.random.default_rng(6).standard_normal((FRAMES, FORCES, 2))
     answer = found.backward(found.forward(right))
-    for t, bears in enumerate(sums.bearing):
+    for t, bears in enumerate(bearing):
         at = np.flatnonzero(bears)
-        own = (1.2 * inner[0][t] + np.diag(inner[1][t] + 0.2))[np.ix_(at, at)]
+        own = (1.2 * forces.inner[t] + np.diag(forces.diagonal[t] + 0.2))[np.ix_(at, at)]
         np.testing.assert_allclose(own @ answer[t, at], right[t, at], atol=1e-6)
         assert not np.delete(answer[t], at, axis=0).any()
 
 
 def test_a_block_that_is_not_finite_is_told(sums, whole):
-    inner, _rest, mixed = parts(whole)
-    inner[0][0, sums.at[0, 0], sums.at[0, 0]] = np.nan
+    forces = parts(whole)
+    forces.inner[0, sums.at[0, 0], sums.at[0, 0]] = np.nan
     with pytest.raises(FloatingPointError, match="not finite"):
-        sums.eliminate(sums.nothing(), 0.0, inner, mixed)
+        sums.eliminate(sums.nothing(), 0.0, forces)
 
 
 def test_arrays_with_gaps_are_refused_not_misread(sums):
@@ -151,7 +175,7 @@ def test_arrays_with_gaps_are_refused_not_misread(sums):
 @pytest.mark.parametrize("compiler", [True, False])
 def test_numbers_go_to_their_places(monkeypatch, compiler):
     if not compiler:
-        monkeypatch.setattr(frame_sums, "compiled_kernels", lambda: None)
+        monkeypatch.setattr(kernels, "compiled_kernels", lambda: None)
     to = np.zeros((2, 2, 3))
     scatter(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([4, 0]), to)
     assert to.tolist() == [[[2, 0, 0], [0, 1, 0]], [[4, 0, 0], [0, 3, 0]]]

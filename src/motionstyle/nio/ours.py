@@ -117,24 +117,30 @@ def _rounds(
     """
     if not learner.settings.rounds:
         return state, trust
-    best: State | None = None
-    for turn in range(learner.settings.rounds + 1):
-        rival = _rival(learner, state, free)
-        if rival is None:
-            held = state
-        else:
-            others = state.inners[1:]
-            kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
-            optima = [state.inners[0], *kept, rival]
-            held = learner.judged(state.place, state.style, free, optima)
-            record(held, free, True)
-        if best is None or held.objective < best.objective:
-            best = held
-        learnable = rival is not None and learner.usable(held)
-        if not learnable or turn == learner.settings.rounds:
+    state, learnable = _held(learner, state, free, record)
+    best = state
+    for _ in range(learner.settings.rounds):
+        if not learnable:
             break
-        state, trust = _stage(learner, held, free, 1.0, record)
+        state, trust = _stage(learner, state, free, 1.0, record)
+        state, learnable = _held(learner, state, free, record)
+        best = min(best, state, key=lambda one: one.objective)
     return best, trust
+
+
+def _held(learner: Learner, state: State, free: Stage, record: _Record) -> tuple[State, bool]:
+    """Return the state judged by where a solve of its own leads, too, and whether to learn from it.
+
+    That is where it leads to a new optimum, and converges.
+    """
+    rival = _rival(learner, state, free)
+    if rival is None:
+        return state, False
+    others = state.inners[1:]
+    kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
+    held = learner.judged(state.place, state.style, free, [state.inners[0], *kept, rival])
+    record(held, free, True)
+    return held, learner.usable(held)
 
 
 def _halfway(stage: Stage, following: Stage) -> Stage:
@@ -155,9 +161,9 @@ def _followed(learner: Learner, state: State, stage: Stage) -> State:
 
 
 def _rival(learner: Learner, state: State, stage: Stage) -> Inner | None:
-    """Return an optimum of the same θ that is none of the known ones, if a solve finds one.
+    """Return where a solve of the same θ ends, if that is none of the known optima.
 
-    The solve goes its own way from X_T, through gentler problems.
+    It goes its own way from X_T, through gentler problems. Whether it converged is in the result.
     """
     learning, settings = learner.learning, learner.settings
     problem = learning.problem(state.style, gain=stage.gain)

@@ -23,12 +23,11 @@ class BandedHessian:
     """
 
     band: Array
-    size: int
 
     @staticmethod
     def of(blocks: Array) -> BandedHessian:
         """Return the matrix whose block of control points k and k + e is blocks[k, e], (n, n)."""
-        return BandedHessian(_laid_out(blocks), blocks.shape[2])
+        return BandedHessian(_laid_out(blocks))
 
     def factor(self, added: Array | float = 0.0) -> Array | None:
         """Return the Cholesky factor of matrix + diag(added), or None if it is not positive."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from motionstyle.spacetime.banded import BandedHessian, assemble_gradient, solve, spread
 from motionstyle.spacetime.barrier_problem import BarrierProblem
-from motionstyle.spacetime.frame_sums import Eliminated
+from motionstyle.spacetime.frame_sums import Eliminated, ForceBlocks
 from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
 from motionstyle.spacetime.spacetime_problem import COUNT, Slopes, Values
 
@@ -28,9 +28,7 @@ class Blocks:
     Attributes
     ----------
     curved, gauss : over the control points, in blocks (K, 4, 36, 40), see `frame_sums`.
-    mixed_gauss : λ × u, (F, 32, 105). mixed_curved : λ × q, (F, 32, 35), as forces enter the
-        dynamics by place alone.
-    inner_gauss : over λ, (F, 32, 32), and inner_diagonal (F, 32) of the barrier and w_λ.
+    forces : λ's own block and that of λ and u, the barrier and w_λ in its diagonal.
     track_pull : ∂φ/∂q of the tracking term, (F, 35).
     force_pull : ∂φ/∂λ without residuals, (F, 32). by_force : ∂r/∂λ, (F, 35, 32), per 100 N.
     stiff : stiffness of the inequality rows, (F, R).
@@ -39,10 +37,7 @@ class Blocks:
     barrier: float
     curved: Array
     gauss: Array
-    mixed_curved: Array
-    mixed_gauss: Array
-    inner_gauss: Array
-    inner_diagonal: Array
+    forces: ForceBlocks
     track_pull: Array
     force_pull: Array
     by_force: Array
@@ -93,10 +88,12 @@ def newton_blocks(
         barrier=barrier,
         curved=curved,
         gauss=gauss,
-        mixed_curved=FORCE_UNIT * np.ascontiguousarray(np.swapaxes(mixed[:, q], 1, 2)),
-        mixed_gauss=np.swapaxes(by_force, 1, 2) @ by_state,
-        inner_gauss=np.swapaxes(by_force, 1, 2) @ by_force,
-        inner_diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
+        forces=ForceBlocks(
+            inner=np.swapaxes(by_force, 1, 2) @ by_force,
+            diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
+            mixed=np.swapaxes(by_force, 1, 2) @ by_state,
+            mixed_place=FORCE_UNIT * np.ascontiguousarray(np.swapaxes(mixed[:, q], 1, 2)),
+        ),
         track_pull=evaluator.tracking_pull(values.coordinates),
         force_pull=pull,
         by_force=by_force,
@@ -135,12 +132,7 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     """
     total = (1 + delta) * blocks.gauss
     total += blocks.curved
-    eliminated = system.sums.eliminate(
-        total,
-        delta,
-        (blocks.inner_gauss, blocks.inner_diagonal),
-        (blocks.mixed_gauss, blocks.mixed_curved),
-    )
+    eliminated = system.sums.eliminate(total, delta, blocks.forces)
     total = total[:, :, :COUNT, :COUNT]
     np.einsum("...ii->...i", total)[...] += delta * system.metric[..., None]
     fixed = np.where(system.fixed, RIGID, 0.0).ravel()

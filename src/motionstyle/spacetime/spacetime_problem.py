@@ -29,7 +29,7 @@ from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.foot_constraints import FootConstraints
 from motionstyle.spacetime.forces import cone_basis
-from motionstyle.spacetime.frame_sums import scatter
+from motionstyle.spacetime.kernels import scatter
 from motionstyle.spacetime.splines import SplineBasis
 from motionstyle.spacetime.style import Style
 

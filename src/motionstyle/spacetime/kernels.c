@@ -1,17 +1,16 @@
-/* The sums over frames that a Newton step is made of, see frame_sums.py.
+/* The solver's innermost loops: sums over frames (frame_sums.py) and scattering (kernels.py).
 
    A frame's matrices over u = (q, q', q'') meet the control points through the four splines alive
-   at it; blocks[k][e] is the block between control points k and k + e, 35 x 35 within 36 x 40. */
+   at it; blocks[k][e] is the block between control points k and k + e, N x N within HIGH x WIDE. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
 
-#define N 35
-#define HIGH 36 /* N in whole groups of four */
-#define WIDE 40 /* N in whole vectors of eight */
+/* N, MOST: coordinates and cone coefficients of a frame; HIGH, WIDE: N in whole groups of four and
+   whole vectors of eight. kernels.py defines them. */
+#define VECTORS (WIDE / 8)
 #define BLOCK (HIGH * WIDE)
-#define ROWS 35 /* most rows of one frame: residuals */
-#define MOST 32 /* cone coefficients of a frame */
+#define ROWS N /* most rows of one frame: residuals */
 typedef double vec __attribute__((vector_size(64), aligned(8)));
 
 /* Rows over u (wide = 3 N) or q (wide = N) as rows over four control points. */
@@ -31,16 +30,16 @@ static void add_gram(ptrdiff_t rows, double (*x)[4][WIDE], double sign, double *
   for (int c = 0; c < 4; ++c)
     for (int e = 0; c + e < 4; ++e)
       for (int b = 0; b < HIGH; b += 4) {
-        vec sum[4][5] = {{{0}}};
+        vec sum[4][VECTORS] = {{{0}}};
         for (ptrdiff_t k = 0; k < rows; ++k) {
           const double *left = &x[k][c][b];
           const vec *right = (const vec *)x[k][c + e];
           for (int i = 0; i < 4; ++i)
-            for (int j = 0; j < 5; ++j) sum[i][j] += left[i] * right[j];
+            for (int j = 0; j < VECTORS; ++j) sum[i][j] += left[i] * right[j];
         }
         double *to = blocks + (4 * c + e) * BLOCK + b * WIDE;
         for (int i = 0; i < 4; ++i)
-          for (int j = 0; j < 5; ++j) *(vec *)(to + i * WIDE + 8 * j) += sign * sum[i][j];
+          for (int j = 0; j < VECTORS; ++j) *(vec *)(to + i * WIDE + 8 * j) += sign * sum[i][j];
       }
 }
 
