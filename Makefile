@@ -14,7 +14,7 @@ run: env
 	$(BIN)/snakemake --cores $(CORES)
 
 test: test-env lint
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(CORES) --dist loadfile
 
 lint: test-env
 	$(BIN)/ruff check .

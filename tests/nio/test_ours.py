@@ -125,6 +125,26 @@ def test_the_round_whose_own_solve_came_closest_is_kept(
     assert len(best.inners) == 2
 
 
+def test_no_step_is_taken_once_the_work_was_too_much(made_learning, settings):
+    spent = replace(settings, stages_work=1, most_work=1, rounds=0)
+    found = ours.learn(made_learning, spent, quiet).rows
+    entered = [(row["closeness"], row["gain"]) for row in found if row["accepted"]]
+    assert len(entered) > len(settings.stages)
+    assert len(set(entered)) == len(entered)
+
+
+def test_no_round_begins_once_the_work_was_too_much(learner, state, settings, monkeypatch):
+    begun = []
+    monkeypatch.setattr(ours, "_held", lambda _learner, now, *_: (now, True))
+    monkeypatch.setattr(ours, "_stage", lambda _learner, now, *_: begun.append(1) or (now, 1.0))
+    one = Learner(learner.learning, replace(settings, rounds=3, most_work=10))
+    for work, rounds in ((9, 3), (10, 0)):
+        begun.clear()
+        one.work = work
+        ours._rounds(one, state, replace(PULLED, closeness=0.0), 1.0, lambda *_: None)
+        assert len(begun) == rounds
+
+
 def test_optima_that_have_become_one_are_one(learner, state):
     twice = learner.judged(state.place, state.style, PULLED, state.inners * 2)
     assert twice.objective == pytest.approx(state.objective)

@@ -62,6 +62,8 @@ class OurSettings:
     rounds, round_steps, round_gain : of solves that go their own way, steps after each, and the
         springs' gain in them. most_optima : known of one θ at once. new_deg : how far from all
         others an optimum counts as another one. final_steps : at the paper's gain.
+    stages_work, most_work : frames times iterations of inner solves, after which stages have no
+        more steps, and after which rounds have none.
     """
 
     stages: Sequence[Stage]
@@ -78,6 +80,8 @@ class OurSettings:
     damping: float
     least_gain: float
     most_between: int
+    stages_work: int
+    most_work: int
     rounds: int
     round_steps: int
     round_gain: float
@@ -116,7 +120,10 @@ def lowest_of(inners: Sequence[Inner]) -> Inner:
 
 
 class Learner:
-    """One run: what does not change between its steps."""
+    """One run: what does not change between its steps, and the work that was done.
+
+    work : frames times iterations of all inner solves, which tells time on any machine.
+    """
 
     def __init__(self, learning: LearningProblem, settings: OurSettings) -> None:
         self.learning = learning
@@ -129,6 +136,16 @@ class Learner:
         self.origin = self.space.coordinates(learning.start)
         joints = COUNT - JOINT_COORDINATES.start
         self.degrees = np.degrees(1.0) / np.sqrt(learning.target.frames * joints)
+        self.work = 0
+
+    def count(self, result: InteriorPointResult) -> None:
+        """Add a solve to the work that was done."""
+        self.work += result.iterations * self.learning.target.frames
+
+    def spent(self, stage: Stage) -> bool:
+        """Tell whether a stage shall have no more steps, since the work was too much."""
+        settings = self.settings
+        return self.work >= (settings.stages_work if stage.closeness else settings.most_work)
 
     def state(
         self,
@@ -150,6 +167,8 @@ class Learner:
             inner_solve(self.learning, style, how, controls, before and before.point)
             for controls, before in starts
         ]
+        for inner in inners:
+            self.count(inner.result)
         return self.judged(place, style, stage, inners)
 
     def judged(self, place: Array, style: Style, stage: Stage, inners: Sequence[Inner]) -> State:

@@ -9,7 +9,8 @@ from making X_T's torques small instead of optimal. Springs are gentler (gain 60
 Close to X_T the solver follows an optimum that need not be the only one. So rounds follow, on the
 problem itself: a solve goes its own way from X_T, and where it ends elsewhere (a counterexample to
 θ), both optima are brought to X_T together from there on. The θ of the round whose optima, that one
-included, came closest is the one that is learnt.
+included, came closest is the one that is learnt. Work (frames times iterations) is bounded, so that
+no clip takes much longer than another.
 """
 
 from __future__ import annotations
@@ -78,6 +79,7 @@ def learn(
     state = _followed(learner, state, final)
     record(state, final, True)
     state, trust = _stage(learner, state, final, trust, record)
+    log(f"{learner.work} frames times iterations")
     return learnt(learning, "ours", state.style, state.lowest, rows)
 
 
@@ -113,14 +115,14 @@ def _rounds(
 
     Every state is held to where a solve of its own leads from X_T: states that look alike from
     close by differ by ten degrees there. Rounds end where a solve finds nothing new, or does not
-    converge.
+    converge, or where the work was too much.
     """
     if not learner.settings.rounds:
         return state, trust
     state, learnable = _held(learner, state, free, record)
     best = state
     for _ in range(learner.settings.rounds):
-        if not learnable:
+        if not learnable or learner.spent(free):
             break
         state, trust = _stage(learner, state, free, 1.0, record)
         state, learnable = _held(learner, state, free, record)
@@ -170,6 +172,7 @@ def _rival(learner: Learner, state: State, stage: Stage) -> Inner | None:
     solved = solve_spacetime(
         problem, learning.controls, settings=SolverSettings(tolerance=settings.tolerance)
     )
+    learner.count(solved)
     cost = cost_of_point(problem, solved.point)
     away = [
         joint_rms_deg(cost.values.coordinates, inner.cost.values.coordinates)
@@ -189,6 +192,8 @@ def _stage(
     jacobian, controls = learner.linearised(state)
     refused = 0
     for _ in range(stage.steps):
+        if learner.spent(stage):
+            break
         step, promised = learner.step(state, jacobian, trust)
         starts = [
             (inner.result.point.controls + (by_style @ step).reshape(-1, COUNT), inner.result)
