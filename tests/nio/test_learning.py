@@ -16,7 +16,7 @@ from motionstyle.nio.learning_problem import (
     learning_problem,
     target_cost,
 )
-from motionstyle.nio.optima import shoe_in_flight
+from motionstyle.nio.optima import shoes_unbalanced
 from motionstyle.nio.paper import PaperSettings, learn_as_paper, soft_constraints
 from motionstyle.nio.preferences import PreferenceSettings, learn_preferences, lowest, plane
 from motionstyle.nio.style_space import StyleSpace
@@ -279,17 +279,17 @@ def test_the_projected_motion_keeps_its_feet_above_the_ground_it_was_projected_o
     assert (heights >= feet.clearance - 1e-12)[~feet.held].all()
 
 
-def test_a_shoe_that_pushes_in_flight_is_found(made_learning):
-    assert not shoe_in_flight(made_learning)
+def test_shoes_that_the_motion_cannot_balance_are_found(made_learning):
+    """Where no foot is held nothing bears what another shoe would push."""
     feet = made_learning.feet
     pushes = target_cost(made_learning, made_learning.start).values.shoe_forces
     frame = int(np.argmax(np.linalg.norm(pushes.sum(axis=1), axis=-1)))
     held = feet.held.copy()
     held[frame] = False
-    assert shoe_in_flight(replace(made_learning, feet=replace(feet, held=held)))
+    flying = replace(made_learning, feet=replace(feet, held=held))
+    assert shoes_unbalanced(flying)
     shoeless = replace(made_learning.start, shoe_stiffness=0.0)
-    loose = replace(made_learning, feet=replace(feet, held=held), start=shoeless)
-    assert not shoe_in_flight(loose)
+    assert not shoes_unbalanced(replace(flying, start=shoeless))
 
 
 def test_a_space_that_keeps_shoes_leaves_all_else_free(made_learning, style):

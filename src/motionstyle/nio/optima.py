@@ -9,7 +9,7 @@ in degrees², y being scaled θ. An optimum's derivative by θ is known exactly
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,8 @@ from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
-LEAST_PUSH_N = 1.0  # of a shoe, to be one that pushes
+SHOE_CHANGE_M, SHOE_CHANGE = 1e-3, 1.5  # of h̄, and the factor of k_shoe, that X_T must bear
+UNBALANCED = 0.1  # of E(X_T), what its root may rise by for that
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
@@ -131,7 +132,7 @@ class Learner:
         space = StyleSpace.of(
             learning.ranges, settings.least_preference, settings.largest_preference
         )
-        self.space = space.keeping_shoes(learning.start) if shoe_in_flight(learning) else space
+        self.space = space.keeping_shoes(learning.start) if shoes_unbalanced(learning) else space
         self.unit = target_cost(learning, learning.start).total / learning.target.frames
         self.origin = self.space.coordinates(learning.start)
         joints = COUNT - JOINT_COORDINATES.start
@@ -241,12 +242,20 @@ class Learner:
         return found, float(((state.residuals + jacobian @ found) ** 2).sum())
 
 
-def shoe_in_flight(learning: LearningProblem) -> bool:
-    """Tell whether a shoe pushes on X_T while no foot point is held.
+def shoes_unbalanced(learning: LearningProblem) -> bool:
+    """Tell whether X_T cannot balance other shoes than those it was projected with.
 
-    Nothing can balance another shoe's force there: X_T obeys Newton with the shoes it was projected
-    with and no others, and a tenth of a millimetre of h̄ puts newtons into its root residual.
+    X_T obeys Newton with these. Where a heel is about to land, or a held foot cannot push where
+    the shoe does, a tenth of a millimetre of h̄ puts newtons into the root residual, and G/E, being
+    a ratio, has no slope left that would bring θ back.
     """
-    flight = ~learning.feet.held.any(axis=1)
-    pushes = target_cost(learning, learning.start).values.shoe_forces[flight]
-    return bool(np.linalg.norm(pushes.sum(axis=1), axis=-1).max(initial=0.0) > LEAST_PUSH_N)
+    start = learning.start
+    cost = target_cost(learning, start)
+    others = [
+        replace(start, shoe_rest_length=start.shoe_rest_length + SHOE_CHANGE_M),
+        replace(start, shoe_rest_length=start.shoe_rest_length - SHOE_CHANGE_M),
+        replace(start, shoe_stiffness=SHOE_CHANGE * start.shoe_stiffness),
+        replace(start, shoe_stiffness=start.shoe_stiffness / SHOE_CHANGE),
+    ]
+    roots = [target_cost(learning, other).root for other in others]
+    return max(roots) - cost.root > UNBALANCED * cost.energy
