@@ -26,6 +26,7 @@ from motionstyle.figures.style import (
     new_figure,
     styled,
 )
+from motionstyle.figures.treads import tread_lines
 from motionstyle.motion.motion import Motion
 
 Array = NDArray[np.float64]
@@ -99,8 +100,8 @@ def stick_strip(
     Parameters
     ----------
     n : number of stick figures; None lets the length of the way decide.
-    view : see `skeleton.project`; the grey line is the level floor y = 0, or, in the oblique view,
-        the pelvis' path on it.
+    view : see `skeleton.project`; the thin grey line is the level floor y = 0, or, in the oblique
+        view, the pelvis' path on it; short ones are treads and ramps under feet that touch them.
     title : by default the motion's id; planted motions are marked. paths : draw the streamers.
     forces : draw each foot's contact force, where known, from its centre of pressure.
 
@@ -110,9 +111,11 @@ def stick_strip(
     points = named_points(motion.body, motion.coordinates)
     points["ground"] = points["pelvis"] * [1, 0, 1]
     arrows = _force_arrows(motion, points) if forces else {}
-    points |= arrows
+    treads = tread_lines(motion, points)
+    points |= arrows | treads
     flat = project(motion, points, view)
-    places = np.stack([path[:, 0] for name, path in flat.items() if name not in arrows])
+    beside = {*arrows, *treads}
+    places = np.stack([path[:, 0] for name, path in flat.items() if name not in beside])
     width = float(np.median(np.ptp(places, axis=0)))
     strip = plan_strip(motion, flat["pelvis"][:, 0], width, n)
     flat = {name: path + np.outer(strip.shift, [1.0, 0.0]) for name, path in flat.items()}
@@ -147,7 +150,11 @@ def stick_strip(
                 look = {"arrowstyle": "-|>", "color": SIDE_COLOURS[side], "lw": 0.8}
                 look |= {"mutation_scale": 5, "shrinkA": 0, "shrinkB": 0}
                 axes.annotate("", tip, foot, arrowprops=look, zorder=3)
-    flat = {name: path for name, path in flat.items() if name not in arrows}
+    for side in "lr":
+        for f in strip.frames:
+            ends = np.array([flat[f"tread_{side}{end}"][f] for end in (0, 1)])
+            axes.plot(*ends.T, color=GROUND, linewidth=1.2, zorder=0)
+    flat = {name: path for name, path in flat.items() if name not in beside}
     _label(axes, motion, strip, flat, view=view, title=title)
     return strip
 
