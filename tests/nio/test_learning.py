@@ -280,16 +280,24 @@ def test_the_projected_motion_keeps_its_feet_above_the_ground_it_was_projected_o
 
 
 def test_shoes_that_the_motion_cannot_balance_are_found(made_learning):
-    """Where no foot is held nothing bears what another shoe would push."""
-    feet = made_learning.feet
-    pushes = target_cost(made_learning, made_learning.start).values.shoe_forces
-    frame = int(np.argmax(np.linalg.norm(pushes.sum(axis=1), axis=-1)))
-    held = feet.held.copy()
-    held[frame] = False
-    flying = replace(made_learning, feet=replace(feet, held=held))
-    assert shoes_unbalanced(flying)
-    shoeless = replace(made_learning.start, shoe_stiffness=0.0)
-    assert not shoes_unbalanced(replace(flying, start=shoeless))
+    """A millimetre more of h̄ pushes where no held point can push back."""
+    start = made_learning.start
+    higher = replace(start, shoe_rest_length=start.shoe_rest_length + 1e-3)
+    before, after = (target_cost(made_learning, style) for style in (start, higher))
+    assert before.root < 0.01 * before.energy
+    assert after.root > before.energy
+    assert shoes_unbalanced(made_learning)
+    shoeless = replace(start, shoe_stiffness=0.0)
+    assert not shoes_unbalanced(replace(made_learning, start=shoeless))
+
+
+def test_shoes_that_are_wrong_from_the_start_are_learnt(made_learning):
+    """A twin's motion was made with other shoes: kept, they left nine tenths of E to the root."""
+    start = made_learning.start
+    wrong = replace(start, shoe_rest_length=start.shoe_rest_length + 0.02, shoe_stiffness=5e4)
+    cost = target_cost(made_learning, wrong)
+    assert cost.root > 0.5 * cost.energy
+    assert not shoes_unbalanced(replace(made_learning, start=wrong))
 
 
 def test_a_space_that_keeps_shoes_leaves_all_else_free(made_learning, style):

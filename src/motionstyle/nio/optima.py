@@ -243,11 +243,12 @@ class Learner:
 
 
 def shoes_unbalanced(learning: LearningProblem) -> bool:
-    """Tell whether X_T cannot balance other shoes than those it was projected with.
+    """Tell whether X_T balances its shoes of the start, but not others.
 
-    X_T obeys Newton with these. Where a heel is about to land, or a held foot cannot push where
-    the shoe does, a tenth of a millimetre of h̄ puts newtons into the root residual, and G/E, being
-    a ratio, has no slope left that would bring θ back.
+    X_T obeys Newton with the shoes it was projected with. Where a heel is about to land, or a held
+    foot cannot push where the shoe does, a tenth of a millimetre of h̄ puts newtons into the root
+    residual, and G/E, being a ratio, has no slope left that would bring θ back. Where the shoes of
+    the start are not balanced either (a twin's motion, made with others), they are to be learnt.
     """
     start = learning.start
     cost = target_cost(learning, start)
@@ -258,4 +259,5 @@ def shoes_unbalanced(learning: LearningProblem) -> bool:
         replace(start, shoe_stiffness=start.shoe_stiffness / SHOE_CHANGE),
     ]
     roots = [target_cost(learning, other).root for other in others]
-    return max(roots) - cost.root > UNBALANCED * cost.energy
+    most = UNBALANCED * cost.energy
+    return cost.root <= most < max(roots) - cost.root
