@@ -25,8 +25,7 @@ def our_settings(settings: Mapping[str, Any], schedule: str) -> OurSettings:
             f"schedule {schedule!r} is not one of {', '.join(schedules)}"
             f"{near_matches(schedule, list(schedules))}"
         )
-    for name in ("rounds", "round_steps", "final_steps"):
-        part[name] = part[name][schedule]
+    part["rounds"] = part["rounds"][schedule]
     stages = [Stage(float(pull), steps, float(gain)) for pull, steps, gain in schedules[schedule]]
     return OurSettings(stages=stages, **part)
 
