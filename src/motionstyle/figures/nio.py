@@ -184,7 +184,7 @@ def identifiability_figure(twins: Sequence[Mapping[str, Sequence[object]]]) -> F
         )
     for level, text in ((1.0, "1° per unit"), (0.1, "0.1° per unit")):
         axes.axhline(level, color="0.6", lw=0.6, ls=":")
-        axes.annotate(text, (1.0, level), xycoords=("axes fraction", "data"), ha="right",
+        axes.annotate(text, (0.02, level), xycoords=("axes fraction", "data"), ha="left",
                       va="bottom", fontsize="x-small", color="0.4")  # fmt: skip
     axes.set_yscale("log")
     axes.set_ylim(bottom=max(1e-6, min(float(min(v)) for v in shown.values())))
