@@ -10,7 +10,9 @@ from motionstyle.motion.motion import Motion
 
 Array = NDArray[np.float64]
 HALF_M = 0.18  # drawn of the ground to either side of a foot's middle
-LEVEL_M, LEVEL_COS = 0.03, np.cos(np.radians(1.0))  # up to which the ground is the level floor
+# Up to which the ground is the level floor. Points that bear just before they lift or after they
+# land are some centimetres above it; treads are higher than that, and ramps show by their slope.
+LEVEL_M, LEVEL_COS = 0.1, np.cos(np.radians(1.0))
 
 
 def tread_lines(motion: Motion, points: dict[str, Array]) -> dict[str, Array]:
