@@ -94,6 +94,15 @@ def test_coordinates_that_are_not_free_stay(walk, markers):
     np.testing.assert_allclose(found, walk.coordinates, atol=2e-4)
 
 
+@pytest.mark.parametrize("joint", ["toes_extension_r", "ankle_dorsiflexion_l"])
+def test_a_hinge_found_a_whole_turn_away_comes_back(walk, markers, joint):
+    column, turned = COORDINATE_INDEX[joint], slice(10, 14)
+    start = np.array(walk.coordinates)
+    start[turned, column] += 2 * np.pi
+    found = retarget.fit_coordinates(walk.body, markers, start, ALL, iterations=30)
+    np.testing.assert_allclose(found[:, 3:], walk.coordinates[:, 3:], atol=1e-3)
+
+
 def test_frames_do_not_depend_on_one_another(walk, markers, monkeypatch):
     start = walk.coordinates + 0.05
     whole = retarget.fit_coordinates(walk.body, markers, start, ALL)

@@ -121,6 +121,12 @@ EXPONENTIAL_BLOCKS: tuple[slice, ...] = (
     slice(3, 6),
     *(s for s, j in zip(JOINT_SLICES, JOINTS, strict=True) if j.kind == "exponential"),
 )
+HINGE_COLUMNS: tuple[int, ...] = tuple(
+    k
+    for block, joint in zip(JOINT_SLICES, JOINTS, strict=True)
+    if joint.kind == "hinges"
+    for k in range(block.start, block.stop)
+)
 
 CONTACT_POINTS: tuple[str, ...] = tuple(
     f"{point}_{side}" for side in "rl" for point in ("heel", "ball_medial", "ball_lateral", "toe")

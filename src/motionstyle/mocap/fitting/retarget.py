@@ -26,6 +26,7 @@ from motionstyle.body.layout import (
     COORDINATE_INDEX,
     COORDINATES,
     EXPONENTIAL_BLOCKS,
+    HINGE_COLUMNS,
     JOINT_SLICES,
     JOINTS,
     NODE_INDEX,
@@ -167,7 +168,18 @@ def _fit_chunk(
         active = active[(np.abs(step).max(axis=1) > tolerance) & (damping[active] < 1e3)]
         if not len(active):
             break
-    return q
+    return _within_half_a_turn(q)
+
+
+def _within_half_a_turn(coordinates: Array) -> Array:
+    """Return coordinates whose hinges turn by at most half a turn.
+
+    Frames are fitted one by one, and a few of them a whole turn away from their neighbours: a joint
+    would spin between them once its angles are filtered.
+    """
+    result, hinges = np.array(coordinates), list(HINGE_COLUMNS)
+    result[:, hinges] -= 2 * np.pi * np.round(result[:, hinges] / (2 * np.pi))
+    return result
 
 
 def fit_legs_to_ground(
@@ -199,7 +211,8 @@ def fit_legs_to_ground(
         result = fit_coordinates(body, held, result, free, iterations=5)
     free |= toes
     result = clear(result)
-    result[:, free] = lowpass(result[:, free], rate_hz, 1.5 * cutoff_hz)
+    continuous, _jumps = make_continuous(result)
+    result[:, free] = lowpass(continuous[:, free], rate_hz, 1.5 * cutoff_hz)
     return result
 
 
