@@ -310,3 +310,17 @@ def test_a_space_that_keeps_shoes_leaves_all_else_free(made_learning, style):
         made_learning.start.shoe_rest_length,
     )
     np.testing.assert_allclose(found.vector()[:-2], usual.style(y, style).vector()[:-2])
+
+
+def test_the_scaled_style_is_the_style_itself_and_its_chain_the_slope(made_learning, style):
+    space = StyleSpace.of(made_learning.ranges, 1e-3, 29.0)
+    y = space.coordinates(style)
+    found = space.style(y, style)
+    np.testing.assert_allclose(found.vector()[29:-2], style.vector()[29:-2], atol=1e-9)
+    np.testing.assert_allclose(found.preferences, style.preferences, atol=1e-12)
+    low, high = space.room(y)
+    way = np.random.default_rng(3).standard_normal(len(y))
+    way[(low > -1e-3) | (high < 1e-3)] = 0.0
+    ends = [space.style(y + sign * 1e-4 * way, style).vector() for sign in (1, -1)]
+    difference = (ends[0] - ends[1]) / 2e-4
+    np.testing.assert_allclose(space.chain(style) @ way, difference, rtol=1e-5, atol=1e-6)

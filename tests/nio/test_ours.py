@@ -136,13 +136,62 @@ def test_no_step_is_taken_once_the_work_was_too_much(made_learning, settings):
 def test_no_round_begins_once_the_work_was_too_much(learner, state, settings, monkeypatch):
     begun = []
     monkeypatch.setattr(ours, "_held", lambda _learner, now, *_: (now, True))
-    monkeypatch.setattr(ours, "_stage", lambda _learner, now, *_: begun.append(1) or (now, 1.0))
+    monkeypatch.setattr(
+        ours, "_stage", lambda _learner, now, *_: begun.append(1) or (replace(now), 1.0)
+    )
     one = Learner(learner.learning, replace(settings, rounds=3, most_work=10))
     for work, rounds in ((9, 3), (10, 0)):
         begun.clear()
         one.work = work
         ours._rounds(one, state, replace(PULLED, closeness=0.0), 1.0, lambda *_: None)
         assert len(begun) == rounds
+
+
+def test_rounds_end_where_neither_a_step_nor_a_solve_finds_anything_new(
+    learner, state, settings, monkeypatch
+):
+    begun = []
+    monkeypatch.setattr(ours, "_rival", lambda *_: None)
+    monkeypatch.setattr(ours, "_stage", lambda _learner, now, *_: begun.append(1) or (now, 1.0))
+    many = Learner(learner.learning, replace(settings, rounds=9))
+    ours._rounds(many, state, PULLED, 1.0, lambda *_: None)
+    assert len(begun) == 1
+    moving = iter([True, True, False])
+    monkeypatch.setattr(
+        ours,
+        "_stage",
+        lambda _learner, now, *_: begun.append(1) or (replace(now) if next(moving) else now, 1.0),
+    )
+    ours._rounds(many, state, PULLED, 1.0, lambda *_: None)
+    assert len(begun) == 4
+
+
+def test_a_solve_that_was_cut_off_gives_way_to_an_optimum(learner, state, monkeypatch):
+    inner = state.inners[0]
+    cut = replace(inner, result=replace(inner.result, optimality=1.0))
+    poor = learner.judged(state.place, state.style, PULLED, [cut])
+    monkeypatch.setattr(ours, "_rival", lambda *_: inner)
+    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None)
+    assert learnable
+    assert held.inners == (inner,)
+    monkeypatch.setattr(ours, "_rival", lambda *_: cut)
+    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None)
+    assert not learnable
+    assert held is poor
+
+
+def test_all_multipliers_of_a_neighbour_lead_to_the_same_optimum_sooner(made_learning, state):
+    inner = state.inners[0]
+    style, how = state.style, InnerSettings(30.0, PULLED.gain, 120, 1e-6, 1e-3)
+    near = style.with_vector(style.vector() * 1.001)
+    before = inner_solve(made_learning, style, how, None, inner.result.point).result.point
+    cold = inner_solve(made_learning, near, how, None, before)
+    warm = inner_solve(made_learning, near, replace(how, whole=True), None, before)
+    assert warm.result.status == cold.result.status == "converged"
+    assert warm.result.iterations < cold.result.iterations
+    np.testing.assert_allclose(
+        warm.cost.values.coordinates, cold.cost.values.coordinates, atol=1e-5
+    )
 
 
 def test_optima_that_have_become_one_are_one(learner, state):

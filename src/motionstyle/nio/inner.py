@@ -20,6 +20,7 @@ from motionstyle.spacetime.spacetime_problem import Evaluator, SpacetimeProblem
 from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
+WARM_ITERATIONS, WARM_BARRIER = 40, 1e-5  # from all multipliers; most small steps need 5 to 15
 IDLE_SHARE = 0.002  # a joint with less of Σ Q_m² than this is idle; an even share is 0.034
 
 
@@ -28,7 +29,9 @@ class InnerSettings:
     """How an inner solve is done.
 
     closeness : pull towards X_T, per rad². gain : of the springs' sigmoid, 1/rad.
-    iterations, tolerance, barrier : of the solver.
+    iterations, tolerance, barrier : of the solver. whole : start from all of a neighbour's
+        multipliers first, which halves the iterations of small steps; where that does not lead to
+        an optimum soon, they are dropped.
     """
 
     closeness: float
@@ -36,6 +39,7 @@ class InnerSettings:
     iterations: int
     tolerance: float
     barrier: float
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,20 +91,27 @@ def inner_solve(
 
     Parameters
     ----------
-    controls : control points to start from (K, 35); X_T's by default. before : a neighbouring
-        optimum, whose contact forces are taken over.
+    controls : control points to start from (K, 35); those before by default, X_T's if there are
+        none. before : a neighbouring optimum, whose contact forces are taken over.
     """
     problem = learning.problem(style, closeness=settings.closeness, gain=settings.gain)
-    solver = InteriorPoint(
-        Evaluator(problem),
-        SolverSettings(
-            tolerance=settings.tolerance, iterations=settings.iterations, barrier=settings.barrier
-        ),
-    )
+    evaluator, spent = Evaluator(problem), 0
     forces = None if before is None else before.coefficients * FORCE_UNIT
     if controls is None:
         controls = learning.controls if before is None else before.controls
-    result = solver.solve(solver.start(controls, forces, near=True))
+    if settings.whole and before is not None:
+        warm = SolverSettings(
+            tolerance=settings.tolerance, iterations=WARM_ITERATIONS, barrier=WARM_BARRIER
+        )
+        result = InteriorPoint(evaluator, warm).solve(replace(before, controls=controls))
+        spent = result.iterations
+    if not spent or result.status != "converged":
+        cold = SolverSettings(
+            tolerance=settings.tolerance, iterations=settings.iterations, barrier=settings.barrier
+        )
+        solver = InteriorPoint(evaluator, cold)
+        result = solver.solve(solver.start(controls, forces, near=True))
+        result = replace(result, iterations=result.iterations + spent)
     return Inner(problem, result, cost_of_point(replace(problem, tracking=None), result.point))
 
 

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
 SHOE_CHANGE_M, SHOE_CHANGE = 1e-3, 1.5  # of h̄, and the factor of k_shoe, that X_T must bear
 UNBALANCED = 0.1  # of E(X_T), what its root may rise by for that
+WHOLE = 0.006  # κ below which neighbours' multipliers are taken over: above, steps are too long
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
@@ -164,10 +165,13 @@ class Learner:
             stage.closeness * self.unit, stage.gain, settings.iterations, settings.tolerance,
             settings.barrier,
         )  # fmt: skip
-        inners = [
-            inner_solve(self.learning, style, how, controls, before and before.point)
-            for controls, before in starts
-        ]
+        inners = []
+        for controls, before in starts:
+            whole = stage.closeness < WHOLE and before is not None and before.status == "converged"
+            point = None if before is None else before.point
+            inners.append(
+                inner_solve(self.learning, style, replace(how, whole=whole), controls, point)
+            )
         for inner in inners:
             self.count(inner.result)
         return self.judged(place, style, stage, inners)
@@ -194,10 +198,13 @@ class Learner:
     def _gap(inner: Inner, target: Cost) -> float:
         return max((target.total - inner.cost.total) / target.total, LEAST_GAP)
 
+    def near_optimum(self, inner: Inner) -> bool:
+        """Tell whether a solve ended near enough to an optimum to be judged."""
+        return inner.result.optimality <= self.settings.usable
+
     def usable(self, state: State) -> bool:
-        """Tell whether a state's motions are near enough to optima to be judged."""
-        usable = self.settings.usable
-        enough = all(inner.result.optimality <= usable for inner in state.inners)
+        """Tell whether all of a state's motions are near enough to optima to be judged."""
+        enough = all(self.near_optimum(inner) for inner in state.inners)
         gap = state.target.total - state.inners[0].cost.total
         return bool(enough and gap >= -NEGATIVE_GAP * state.target.total)
 

@@ -114,8 +114,8 @@ def _rounds(
     """Return the best state of all rounds, and the trust to go on with.
 
     Every state is held to where a solve of its own leads from X_T: states that look alike from
-    close by differ by ten degrees there. Rounds end where a solve finds nothing new, or does not
-    converge, or where the work was too much.
+    close by differ by ten degrees there. Rounds end where a solve does not converge, where neither
+    it nor the steps before it found anything new, or where the work was too much.
     """
     if not learner.settings.rounds:
         return state, trust
@@ -124,8 +124,11 @@ def _rounds(
     for _ in range(learner.settings.rounds):
         if not learnable or learner.spent(free):
             break
+        before = state
         state, trust = _stage(learner, state, free, 1.0, record)
         state, learnable = _held(learner, state, free, record)
+        if state is before:
+            break
         best = min(best, state, key=lambda one: one.objective)
     return best, trust
 
@@ -133,14 +136,17 @@ def _rounds(
 def _held(learner: Learner, state: State, free: Stage, record: _Record) -> tuple[State, bool]:
     """Return the state judged by where a solve of its own leads, too, and whether to learn from it.
 
-    That is where it leads to a new optimum, and converges.
+    Optima whose solves were cut off are dropped where there is another one.
     """
     rival = _rival(learner, state, free)
     if rival is None:
-        return state, False
-    others = state.inners[1:]
+        return state, learner.usable(state)
+    known = [one for one in state.inners if learner.near_optimum(one)]
+    if not learner.near_optimum(rival):
+        return state, learner.usable(state)
+    first, others = known[:1], known[1:]
     kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
-    held = learner.judged(state.place, state.style, free, [state.inners[0], *kept, rival])
+    held = learner.judged(state.place, state.style, free, [*first, *kept, rival])
     record(held, free, True)
     return held, learner.usable(held)
 
