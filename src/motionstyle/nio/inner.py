@@ -91,28 +91,29 @@ def inner_solve(
 
     Parameters
     ----------
-    controls : control points to start from (K, 35); those before by default, X_T's if there are
-        none. before : a neighbouring optimum, whose contact forces are taken over.
+    controls : control points to start from (K, 35); by default those of `before`, X_T's if
+        there is none. before : a neighbouring optimum, whose contact forces are taken over.
     """
     problem = learning.problem(style, closeness=settings.closeness, gain=settings.gain)
-    evaluator, spent = Evaluator(problem), 0
+    evaluator, result, spent = Evaluator(problem), None, 0
     forces = None if before is None else before.coefficients * FORCE_UNIT
     if controls is None:
         controls = learning.controls if before is None else before.controls
     if settings.whole and before is not None:
-        warm = SolverSettings(
-            tolerance=settings.tolerance, iterations=WARM_ITERATIONS, barrier=WARM_BARRIER
-        )
-        result = InteriorPoint(evaluator, warm).solve(replace(before, controls=controls))
+        solver = _solver(evaluator, settings, WARM_ITERATIONS, WARM_BARRIER)
+        result = solver.solve(replace(before, controls=controls))
         spent = result.iterations
-    if not spent or result.status != "converged":
-        cold = SolverSettings(
-            tolerance=settings.tolerance, iterations=settings.iterations, barrier=settings.barrier
-        )
-        solver = InteriorPoint(evaluator, cold)
+    if result is None or result.status != "converged":
+        solver = _solver(evaluator, settings, settings.iterations, settings.barrier)
         result = solver.solve(solver.start(controls, forces, near=True))
         result = replace(result, iterations=result.iterations + spent)
     return Inner(problem, result, cost_of_point(replace(problem, tracking=None), result.point))
+
+
+def _solver(
+    evaluator: Evaluator, settings: InnerSettings, iterations: int, barrier: float
+) -> InteriorPoint:
+    return InteriorPoint(evaluator, SolverSettings(settings.tolerance, iterations, barrier=barrier))
 
 
 def effective_number(shares: Array) -> float:

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
 SHOE_CHANGE_M, SHOE_CHANGE = 1e-3, 1.5  # of h̄, and the factor of k_shoe, that X_T must bear
 UNBALANCED = 0.1  # of E(X_T), what its root may rise by for that
-WHOLE = 0.006  # κ below which neighbours' multipliers are taken over: above, steps are too long
+WARM_CLOSENESS = 0.006  # κ below which all multipliers are taken over: above, steps are too long
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
@@ -167,13 +167,13 @@ class Learner:
         )  # fmt: skip
         inners = []
         for controls, before in starts:
-            whole = stage.closeness < WHOLE and before is not None and before.status == "converged"
-            point = None if before is None else before.point
-            inners.append(
-                inner_solve(self.learning, style, replace(how, whole=whole), controls, point)
+            known = before is not None and before.status == "converged"
+            whole = known and stage.closeness < WARM_CLOSENESS
+            inner = inner_solve(
+                self.learning, style, replace(how, whole=whole), controls, before and before.point
             )
-        for inner in inners:
             self.count(inner.result)
+            inners.append(inner)
         return self.judged(place, style, stage, inners)
 
     def judged(self, place: Array, style: Style, stage: Stage, inners: Sequence[Inner]) -> State:

@@ -114,8 +114,9 @@ def _rounds(
     """Return the best state of all rounds, and the trust to go on with.
 
     Every state is held to where a solve of its own leads from X_T: states that look alike from
-    close by differ by ten degrees there. Rounds end where a solve does not converge, where neither
-    it nor the steps before it found anything new, or where the work was too much.
+    close by differ by ten degrees there. Rounds end where neither that solve nor the steps before
+    it found anything new, where no optimum of the state is near enough to be learnt from, or where
+    the work was too much.
     """
     if not learner.settings.rounds:
         return state, trust
@@ -136,14 +137,13 @@ def _rounds(
 def _held(learner: Learner, state: State, free: Stage, record: _Record) -> tuple[State, bool]:
     """Return the state judged by where a solve of its own leads, too, and whether to learn from it.
 
-    Optima whose solves were cut off are dropped where there is another one.
+    A solve that was cut off tells nothing, and the state stays. Optima of its own that were cut
+    off are dropped where there is another one.
     """
     rival = _rival(learner, state, free)
-    if rival is None:
+    if rival is None or not learner.near_optimum(rival):
         return state, learner.usable(state)
     known = [one for one in state.inners if learner.near_optimum(one)]
-    if not learner.near_optimum(rival):
-        return state, learner.usable(state)
     first, others = known[:1], known[1:]
     kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
     held = learner.judged(state.place, state.style, free, [*first, *kept, rival])

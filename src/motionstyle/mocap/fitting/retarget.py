@@ -168,16 +168,16 @@ def _fit_chunk(
         active = active[(np.abs(step).max(axis=1) > tolerance) & (damping[active] < 1e3)]
         if not len(active):
             break
-    return _within_half_a_turn(q)
+    return _within_half_a_turn(q, columns)
 
 
-def _within_half_a_turn(coordinates: Array) -> Array:
-    """Return coordinates whose hinges turn by at most half a turn.
+def _within_half_a_turn(coordinates: Array, columns: NDArray[np.int64]) -> Array:
+    """Return coordinates of whose columns the hinges turn by at most half a turn.
 
     Frames are fitted one by one, and a few of them a whole turn away from their neighbours: a joint
     would spin between them once its angles are filtered.
     """
-    result, hinges = np.array(coordinates), list(HINGE_COLUMNS)
+    result, hinges = np.array(coordinates), np.intersect1d(columns, HINGE_COLUMNS)
     result[:, hinges] -= 2 * np.pi * np.round(result[:, hinges] / (2 * np.pi))
     return result
 
