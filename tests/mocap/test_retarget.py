@@ -15,6 +15,7 @@ from motionstyle.body.layout import (
     COORDINATE_INDEX,
     COORDINATES,
     EXPONENTIAL_BLOCKS,
+    HINGE_COLUMNS,
     NODES,
 )
 from motionstyle.body.rotations import exponential
@@ -239,6 +240,33 @@ def test_a_body_of_the_clips_own_fits_its_markers(plain_body, walk):
     assert np.abs(error[:, toes]).max() < 6
     points = contact_points(body, forward_kinematics(body, found))
     assert detect_contacts(points, RATE, WALK, np.zeros(points.shape[:2])).any()
+
+
+def test_a_hinge_that_passes_half_a_turn_stays_continuous():
+    truth = np.zeros((200, len(COORDINATES)))
+    truth[:, list(HINGE_COLUMNS)] = np.radians(np.linspace(0, 250, 200))[:, None]
+    wrapped = truth - 2 * np.pi * np.round(truth / (2 * np.pi))
+    assert np.abs(np.diff(wrapped, axis=0)).max() > 6
+    found, jumps = retarget.make_continuous(wrapped)
+    np.testing.assert_allclose(found, truth, atol=1e-12)
+    assert jumps == ()
+
+
+def test_a_frame_a_whole_turn_away_does_not_make_a_toe_spin(walk, markers):
+    """Filtered as it was, rajagopal's toe turned by 400 degrees in swing."""
+    toe = COORDINATE_INDEX["toes_extension_r"]
+    turned = np.array(walk.coordinates)
+    turned[20:26, toe] += 2 * np.pi
+    points = contact_points(walk.body, forward_kinematics(walk.body, walk.coordinates))
+    level, none = np.full(points.shape[:2], -1.0), np.zeros(points.shape[:2], dtype=bool)
+
+    def toes(coordinates):
+        """The filtered toe."""
+        return retarget.fit_legs_to_ground(walk.body, markers, coordinates, none, level, RATE, 6.0)[
+            :, toe
+        ]
+
+    np.testing.assert_allclose(toes(turned), toes(walk.coordinates), atol=1e-6)
 
 
 @pytest.mark.parametrize("block", EXPONENTIAL_BLOCKS)

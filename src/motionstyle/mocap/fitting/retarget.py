@@ -174,8 +174,7 @@ def _fit_chunk(
 def _within_half_a_turn(coordinates: Array, columns: NDArray[np.int64]) -> Array:
     """Return coordinates of whose columns the hinges turn by at most half a turn.
 
-    Frames are fitted one by one, and a few of them a whole turn away from their neighbours: a joint
-    would spin between them once its angles are filtered.
+    Frames are fitted one by one, and a few of them a whole turn away from their neighbours.
     """
     result, hinges = np.array(coordinates), np.intersect1d(columns, HINGE_COLUMNS)
     result[:, hinges] -= 2 * np.pi * np.round(result[:, hinges] / (2 * np.pi))
@@ -241,8 +240,12 @@ def lift_toes(body: Body, coordinates: Array, ground: Array) -> Array:
 
 
 def make_continuous(coordinates: Array) -> tuple[Array, tuple[int, ...]]:
-    """Return coordinates whose exponential maps are continuous in time, and re-branched frames."""
-    result = np.array(coordinates)
+    """Return coordinates whose angles are continuous in time, and frames of re-branched maps.
+
+    A joint would spin between two branches once its angles are filtered.
+    """
+    result, hinges = np.array(coordinates), list(HINGE_COLUMNS)
+    result[:, hinges] = np.unwrap(coordinates[:, hinges], axis=0)
     jumps: set[int] = set()
     for block in EXPONENTIAL_BLOCKS:
         result[:, block], found = unroll(coordinates[:, block])
