@@ -73,6 +73,21 @@ def test_straight_motions_have_no_lean_to_a_centre():
     assert np.isnan(measure.lean_to_centre_deg(WALK))
 
 
+def test_a_turn_is_the_feet_s_where_the_pelvis_drifts_out_of_it():
+    frames, circle = 900, gliding(radius=2.0, frames=900, speed=0.15)
+    lean = 40 * np.linspace(0, 1, frames) ** 2 * DEG  # outwards, about the feet, ever faster
+    tilt = exponential(lean[:, None] * [1.0, 0, 0])
+    turn = exponential(circle.coordinates[:, 3:6])
+    q = circle.coordinates.copy()
+    q[:, :3] += np.einsum("fij,fjk,k->fi", turn, tilt - np.eye(3), [0, 0.93, 0])
+    q[:, 3:6] = logarithm(turn @ tilt)
+    outwards = replace(circle, coordinates=q)
+    turning = measure.turning_frames(outwards)
+    assert turning.mean() > 0.8  # the pelvis itself goes straight on
+    expected = -np.degrees(lean[turning].mean())
+    assert measure.lean_to_centre_deg(outwards) == pytest.approx(expected, abs=1.0)
+
+
 def test_mirrored_turns_lean_alike():
     motion = gliding(radius=2.0, lean_deg=5.0)
     q = motion.coordinates.copy()

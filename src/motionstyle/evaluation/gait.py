@@ -97,16 +97,34 @@ def _stride_window(motion: Motion) -> int:
 
 def smooth_path(motion: Motion) -> Array:
     """Return the pelvis' horizontal path averaged over a stride, (F, 3), m, with y = 0."""
-    path = motion.coordinates[:, :3] * [1, 0, 1]
-    return savgol_filter(path, _stride_window(motion), 1, axis=0, mode="interp")
+    return _averaged(motion, motion.coordinates[:, :3])
 
 
-def travel_directions(motion: Motion) -> Array:
+def feet_path(motion: Motion) -> Array:
+    """Return the horizontal path of the middle of both feet, averaged over a stride, (F, 3), m.
+
+    Footprints fix it, where the pelvis of a synthesis may drift at its free ends.
+    """
+    positions = motion.pose().positions
+    feet = positions[:, NODE_INDEX["foot_r"]] + positions[:, NODE_INDEX["foot_l"]]
+    return _averaged(motion, feet / 2)
+
+
+def _averaged(motion: Motion, path: Array) -> Array:
+    return savgol_filter(path * [1, 0, 1], _stride_window(motion), 1, axis=0, mode="interp")
+
+
+def travel_directions(motion: Motion, path: Array | None = None) -> Array:
     """Return the horizontal unit vector of travel per frame, (F, 3).
 
-    Where the pelvis hardly travels (below 0.1 m/s) it is the direction the pelvis faces.
+    Where the path hardly goes on (below 0.1 m/s) it is the direction the pelvis faces.
+
+    Parameters
+    ----------
+    path : whose direction is meant, (F, 3), m; by default `smooth_path`.
     """
-    velocity = np.gradient(smooth_path(motion), 1 / motion.rate_hz, axis=0)
+    path = smooth_path(motion) if path is None else path
+    velocity = np.gradient(path, 1 / motion.rate_hz, axis=0)
     facing = motion.pose().rotations[:, NODE_INDEX["pelvis"], :, 0] * [1, 0, 1]
     slow = np.linalg.norm(velocity, axis=1) < SLOWEST_TRAVEL_MPS
     direction = np.where(slow[:, None], facing, velocity)

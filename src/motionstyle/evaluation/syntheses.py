@@ -15,10 +15,10 @@ from motionstyle.body.kinematics import centre_of_mass, contact_points, end_poin
 from motionstyle.body.layout import COORDINATE_INDEX, COORDINATES, JOINT_COORDINATES, NODE_INDEX
 from motionstyle.evaluation.gait import (
     clinical_angles,
+    feet_path,
     gait_cycles,
     mean_speed,
     normalised_cycles,
-    smooth_path,
     travel_directions,
 )
 from motionstyle.mocap.fitting.floor import runs
@@ -35,8 +35,8 @@ _UP = np.array([0.0, 1.0, 0.0])
 
 # ------------------------------------------------------------------------------ turns and leans
 def turn_rates(motion: Motion) -> Array:
-    """Return how fast the path turns, rad/s, left positive, (F,)."""
-    directions = travel_directions(motion)
+    """Return how fast the feet's path turns, rad/s, left positive, (F,)."""
+    directions = travel_directions(motion, feet_path(motion))
     headings = np.unwrap(np.arctan2(-directions[:, 2], directions[:, 0]))
     return np.gradient(headings, 1 / motion.rate_hz)
 
@@ -46,7 +46,7 @@ def turning_frames(motion: Motion) -> NDArray[np.bool_]:
     rates = turn_rates(motion)
     if abs(rates.sum()) / motion.rate_hz < np.radians(LEAST_TURN_DEG):
         return np.zeros(motion.frames, dtype=bool)
-    speed = np.linalg.norm(np.gradient(smooth_path(motion), 1 / motion.rate_hz, axis=0), axis=1)
+    speed = np.linalg.norm(np.gradient(feet_path(motion), 1 / motion.rate_hz, axis=0), axis=1)
     return np.abs(rates) * WIDEST_TURN_M > np.maximum(speed, 0.1)
 
 
@@ -60,7 +60,7 @@ def _trunk(motion: Motion) -> Array:
 def lateral_leans(motion: Motion) -> Array:
     """Return the trunk's lean to the left of the direction of travel, degrees, (F,)."""
     trunk = _trunk(motion)
-    left = np.cross(_UP, travel_directions(motion))
+    left = np.cross(_UP, travel_directions(motion, feet_path(motion)))
     return np.degrees(np.arctan2((trunk * left).sum(axis=1), trunk[:, 1]))
 
 
