@@ -103,6 +103,38 @@ def test_where_the_motion_jumps_a_stage_is_put_between(made_learning, settings, 
     assert round(float(np.sqrt(0.1 * 0.01)), 6) in tried
 
 
+def moved_by(inner, radians):
+    """The solve, ended elsewhere."""
+    values = inner.cost.values
+    far = replace(values, coordinates=values.coordinates + radians)
+    return replace(inner, cost=replace(inner.cost, values=far))
+
+
+@pytest.mark.parametrize("cut_off", [False, True])
+def test_an_optimum_that_ceases_to_be_one_does_not_forbid_a_step(learner, state, cut_off):
+    one = state.inners[0]
+    far = moved_by(one, np.radians(60.0))
+    if cut_off:
+        far = replace(far, result=replace(far.result, optimality=1.0))
+    before = learner.judged(state.place, state.style, PULLED, [one, moved_by(one, 0.05)])
+    found = learner.judged(state.place, state.style, PULLED, [one, far])
+    none = [np.zeros_like(one.result.point.controls)] * 2
+    was, becomes, reached = ours._compared(learner, before, found, PULLED, none)
+    alone = learner.judged(state.place, state.style, PULLED, [one])
+    assert was == becomes == pytest.approx(alone.objective)
+    assert len(reached.inners) == (1 if cut_off else 2)
+    assert learner.usable(reached)
+
+
+def test_where_all_optima_jumped_all_are_compared(learner, state):
+    one = state.inners[0]
+    found = learner.judged(state.place, state.style, PULLED, [moved_by(one, np.radians(60.0))])
+    none = [np.zeros_like(one.result.point.controls)]
+    was, becomes, reached = ours._compared(learner, state, found, PULLED, none)
+    assert (was, becomes) == (state.objective, pytest.approx(found.objective))
+    assert reached.objective == pytest.approx(found.objective)
+
+
 @pytest.mark.parametrize(("first_away", "second_away"), [(0.5, 0.1), (0.1, 0.5)])
 def test_the_round_whose_own_solve_came_closest_is_kept(
     learner, state, settings, monkeypatch, first_away, second_away
@@ -111,10 +143,7 @@ def test_the_round_whose_own_solve_came_closest_is_kept(
     moved = learner.judged(state.place + 1e-3, state.style, PULLED, state.inners)
 
     def rival(_learner, now, _stage):
-        inner = now.inners[0]
-        values = inner.cost.values
-        far = replace(values, coordinates=values.coordinates + next(away))
-        return replace(inner, cost=replace(inner.cost, values=far))
+        return moved_by(now.inners[0], next(away))
 
     monkeypatch.setattr(ours, "_rival", rival)
     monkeypatch.setattr(ours, "_stage", lambda *_: (moved, 1.0))
@@ -126,7 +155,7 @@ def test_the_round_whose_own_solve_came_closest_is_kept(
 
 
 def test_no_step_is_taken_once_the_work_was_too_much(made_learning, settings):
-    spent = replace(settings, stages_work=1, most_work=1, rounds=0)
+    spent = replace(settings, stages_work=1, rounds_work=1, most_work=1, rounds=0)
     found = ours.learn(made_learning, spent, quiet).rows
     entered = [(row["closeness"], row["gain"]) for row in found if row["accepted"]]
     assert len(entered) > len(settings.stages)
@@ -139,7 +168,7 @@ def test_no_round_begins_once_the_work_was_too_much(learner, state, settings, mo
     monkeypatch.setattr(
         ours, "_stage", lambda _learner, now, *_: begun.append(1) or (replace(now), 1.0)
     )
-    one = Learner(learner.learning, replace(settings, rounds=3, most_work=10))
+    one = Learner(learner.learning, replace(settings, rounds=3, rounds_work=10))
     for work, rounds in ((9, 3), (10, 0)):
         begun.clear()
         one.work = work

@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 LEAST_GAP = 1e-6  # of G/E, below which its root has no useful slope
 SHOE_CHANGE_M, SHOE_CHANGE = 1e-3, 1.5  # of h̄, and the factor of k_shoe, that X_T must bear
 UNBALANCED = 0.1  # of E(X_T), what its root may rise by for that
-WARM_CLOSENESS = 0.006  # κ below which all multipliers are taken over: above, steps are too long
 NEGATIVE_GAP = 1e-3  # of E: a "minimum" that much above X_T is none
 
 
@@ -64,8 +63,8 @@ class OurSettings:
     rounds, round_steps, round_gain : of solves that go their own way, steps after each, and the
         springs' gain in them. most_optima : known of one θ at once. new_deg : how far from all
         others an optimum counts as another one. final_steps : at the paper's gain.
-    stages_work, most_work : frames times iterations of inner solves, after which stages have no
-        more steps, and after which rounds have none.
+    stages_work, rounds_work, most_work : frames times iterations of inner solves, after which
+        stages have no more steps, rounds have none, and nothing has.
     """
 
     stages: Sequence[Stage]
@@ -83,6 +82,7 @@ class OurSettings:
     least_gain: float
     most_between: int
     stages_work: int
+    rounds_work: int
     most_work: int
     rounds: int
     round_steps: int
@@ -147,7 +147,10 @@ class Learner:
     def spent(self, stage: Stage) -> bool:
         """Tell whether a stage shall have no more steps, since the work was too much."""
         settings = self.settings
-        return self.work >= (settings.stages_work if stage.closeness else settings.most_work)
+        if stage.closeness:
+            return self.work >= settings.stages_work
+        in_rounds = stage.gain == settings.round_gain
+        return self.work >= (settings.rounds_work if in_rounds else settings.most_work)
 
     def state(
         self,
@@ -168,7 +171,8 @@ class Learner:
         inners = []
         for controls, before in starts:
             known = before is not None and before.status == "converged"
-            whole = known and stage.closeness < WARM_CLOSENESS
+            # While X_S is pulled, a solve that keeps them stays with optima that are about to go.
+            whole = known and not stage.closeness
             inner = inner_solve(
                 self.learning, style, replace(how, whole=whole), controls, before and before.point
             )

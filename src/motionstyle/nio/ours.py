@@ -15,12 +15,13 @@ no clip takes much longer than another.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionstyle.dynamics.passive import SIGMOID_GAIN
 from motionstyle.motion.difference import joint_rms_deg
@@ -31,7 +32,10 @@ from motionstyle.spacetime.continuation import solve_spacetime
 from motionstyle.spacetime.solver_point import SolverSettings
 from motionstyle.spacetime.spacetime_problem import COUNT
 
-MOST_REFUSALS = 2  # in a row, then a stage ends: each costs several steps that are taken
+Array = NDArray[np.float64]
+# In a row, then a stage ends: each costs several steps that are taken. Without a pull shorter steps
+# lead on where long ones do not.
+MOST_REFUSALS, MOST_FREE_REFUSALS = 2, 5
 # Of what the linear model promised: above, the next step may be longer; below, it is shorter.
 GOOD_SHARE, POOR_SHARE, MOST_TRUST = 0.6, 0.25, 8.0
 JUMP = 2.0  # of the objective: the pull fell too far at once, X_S went elsewhere
@@ -75,10 +79,7 @@ def learn(
     free = Stage(0.0, settings.round_steps, settings.round_gain)
     state, trust = _released(learner, free, record)
     state, trust = _rounds(learner, state, free, trust, record)
-    final = Stage(0.0, settings.final_steps, SIGMOID_GAIN)
-    state = _followed(learner, state, final)
-    record(state, final, True)
-    state, trust = _stage(learner, state, final, trust, record)
+    state = _finished(learner, state, trust, record)
     log(f"{learner.work} frames times iterations")
     return learnt(learning, "ours", state.style, state.lowest, rows)
 
@@ -126,12 +127,25 @@ def _rounds(
         if not learnable or learner.spent(free):
             break
         before = state
-        state, trust = _stage(learner, state, free, 1.0, record)
+        state, trust = _stage(learner, state, free, trust, record)
         state, learnable = _held(learner, state, free, record)
         if state is before:
             break
         best = min(best, state, key=lambda one: one.objective)
     return best, trust
+
+
+def _finished(learner: Learner, state: State, trust: float, record: _Record) -> State:
+    """Return the state after some steps with the paper's springs, held to its own way there, too.
+
+    Springs that are steeper have optima of their own, so the last round is theirs.
+    """
+    final = Stage(0.0, learner.settings.final_steps, SIGMOID_GAIN)
+    state = _followed(learner, state, final)
+    record(state, final, True)
+    if final.steps and not learner.spent(final):
+        state, _learnable = _held(learner, state, final, record)
+    return _stage(learner, state, final, trust, record)[0]
 
 
 def _held(learner: Learner, state: State, free: Stage, record: _Record) -> tuple[State, bool]:
@@ -196,25 +210,27 @@ def _stage(
 ) -> tuple[State, float]:
     """Return the best state of one stage, and the trust to go on with."""
     jacobian, controls = learner.linearised(state)
-    refused = 0
+    most, refused = MOST_REFUSALS if stage.closeness else MOST_FREE_REFUSALS, 0
     for _ in range(stage.steps):
         if learner.spent(stage):
             break
         step, promised = learner.step(state, jacobian, trust)
+        moves = [(by_style @ step).reshape(-1, COUNT) for by_style in controls]
         starts = [
-            (inner.result.point.controls + (by_style @ step).reshape(-1, COUNT), inner.result)
-            for inner, by_style in zip(state.inners, controls, strict=True)
+            (inner.result.point.controls + move, inner.result)
+            for inner, move in zip(state.inners, moves, strict=True)
         ]
         found = learner.state(state.place + step, stage, starts)
-        better = learner.usable(found) and found.objective < state.objective
+        before, after, found = _compared(learner, state, found, stage, moves)
+        better = learner.usable(found) and after < before
         record(found, stage, better)
         if not better:
             trust, refused = 0.3 * trust, refused + 1
-            if refused == MOST_REFUSALS:
+            if refused == most:
                 break
             continue
-        gained = 1 - found.objective / state.objective
-        kept = (state.objective - found.objective) / max(state.objective - promised, 1e-12)
+        gained = 1 - after / before
+        kept = (before - after) / max(state.objective - promised, 1e-12)
         if kept > GOOD_SHARE:
             trust = min(MOST_TRUST, 2 * trust)
         elif kept < POOR_SHARE:
@@ -224,6 +240,45 @@ def _stage(
             break
         jacobian, controls = learner.linearised(state)
     return state, min(1.0, 2 * trust)
+
+
+def _compared(
+    learner: Learner, state: State, found: State, stage: Stage, moves: Sequence[Array]
+) -> tuple[float, float, State]:
+    """Return the objective before and after a step of the optima that stayed, and all found.
+
+    An optimum may cease to be one, and a solve from there ends elsewhere or is cut off. Were it
+    taken for the same, no step would be better that lets a nearly vanished optimum go (CMU 08
+    stayed at 14° for it). What it leads to is held against the next step; what was cut off is found
+    again by a solve of its own, if it is there. Where none stayed, all are compared.
+
+    Parameters
+    ----------
+    moves : of the control points, as the linear model foretold, (K, 35) each.
+    """
+    near = [learner.near_optimum(inner) for inner in found.inners]
+    stayed = [
+        k
+        for k, (old, new, move) in enumerate(zip(state.inners, found.inners, moves, strict=True))
+        if near[k] and _strayed_deg(old, new, move) < learner.settings.new_deg
+    ]
+    kept = [inner for inner, good in zip(found.inners, near, strict=True) if good]
+    if len(stayed) == len(moves) or not kept:
+        return state.objective, found.objective, found
+    reached = learner.judged(found.place, found.style, stage, kept)
+    if not stayed:
+        return state.objective, reached.objective, reached
+    before, after = (
+        learner.judged(one.place, one.style, stage, [one.inners[k] for k in stayed]).objective
+        for one in (state, found)
+    )
+    return before, after, reached
+
+
+def _strayed_deg(old: Inner, new: Inner, move: Array) -> float:
+    """Return how far an optimum ended from where the linear model put it, rms over joints."""
+    foretold = old.cost.values.coordinates + old.problem.basis().evaluate(move)[0]
+    return joint_rms_deg(new.cost.values.coordinates, foretold)
 
 
 def _distinct(learner: Learner, state: State, stage: Stage) -> State:

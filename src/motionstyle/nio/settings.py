@@ -16,7 +16,7 @@ def our_settings(settings: Mapping[str, Any], schedule: str) -> OurSettings:
     Raises
     ------
     MotionStyleError
-        If there is no such schedule.
+        If there is no such schedule, or nothing that is set by schedule for it.
     """
     part = dict(settings["ours"])
     schedules = part.pop("schedules")
@@ -25,7 +25,12 @@ def our_settings(settings: Mapping[str, Any], schedule: str) -> OurSettings:
             f"schedule {schedule!r} is not one of {', '.join(schedules)}"
             f"{near_matches(schedule, list(schedules))}"
         )
-    part["rounds"] = part["rounds"][schedule]
+    for name in ("rounds", "stages_work", "rounds_work", "most_work"):
+        if schedule not in part[name]:
+            raise MotionStyleError(
+                f"ours.{name} of config/nio.yaml has no entry for schedule {schedule!r}: add one"
+            )
+        part[name] = part[name][schedule]
     stages = [Stage(float(pull), steps, float(gain)) for pull, steps, gain in schedules[schedule]]
     return OurSettings(stages=stages, **part)
 
