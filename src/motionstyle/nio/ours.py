@@ -43,6 +43,7 @@ FREE_RATIO = 16.0  # κ = 0 counts as that much less than the last κ where one 
 
 
 _Record = Callable[[State, Stage, bool], None]
+_Rival = Callable[[Learner, State, Stage], Inner | None]
 
 
 def learn(
@@ -121,14 +122,14 @@ def _rounds(
     """
     if not learner.settings.rounds:
         return state, trust
-    state, learnable = _held(learner, state, free, record)
+    state, learnable = _held(learner, state, free, record, _rival)
     best = state
     for _ in range(learner.settings.rounds):
         if not learnable or learner.spent(free):
             break
         before = state
         state, trust = _stage(learner, state, free, trust, record)
-        state, learnable = _held(learner, state, free, record)
+        state, learnable = _held(learner, state, free, record, _rival)
         if state is before:
             break
         best = min(best, state, key=lambda one: one.objective)
@@ -136,25 +137,29 @@ def _rounds(
 
 
 def _finished(learner: Learner, state: State, trust: float, record: _Record) -> State:
-    """Return the state after some steps with the paper's springs, held to its own way there, too.
+    """Return the state after some steps with the paper's springs, held to its own ways there, too.
 
-    Springs that are steeper have optima of their own, so the last round is theirs.
+    Springs that are steeper have optima of their own, so the last round is theirs. There a solve
+    straight from X_T may end elsewhere than one through gentler springs (sad 10.6 and 7.5°).
     """
     final = Stage(0.0, learner.settings.final_steps, SIGMOID_GAIN)
     state = _followed(learner, state, final)
     record(state, final, True)
-    if final.steps and not learner.spent(final):
-        state, _learnable = _held(learner, state, final, record)
+    for rival in (_rival, _straight_rival):
+        if final.steps and not learner.spent(final):
+            state, _learnable = _held(learner, state, final, record, rival)
     return _stage(learner, state, final, trust, record)[0]
 
 
-def _held(learner: Learner, state: State, free: Stage, record: _Record) -> tuple[State, bool]:
+def _held(
+    learner: Learner, state: State, free: Stage, record: _Record, rival_of: _Rival
+) -> tuple[State, bool]:
     """Return the state judged by where a solve of its own leads, too, and whether to learn from it.
 
     A solve that was cut off tells nothing, and the state stays. Optima of its own that were cut
     off are dropped where there is another one.
     """
-    rival = _rival(learner, state, free)
+    rival = rival_of(learner, state, free)
     if rival is None or not learner.near_optimum(rival):
         return state, learner.usable(state)
     known = [one for one in state.inners if learner.near_optimum(one)]
@@ -193,12 +198,22 @@ def _rival(learner: Learner, state: State, stage: Stage) -> Inner | None:
         problem, learning.controls, settings=SolverSettings(tolerance=settings.tolerance)
     )
     learner.count(solved)
-    cost = cost_of_point(problem, solved.point)
-    away = [
-        joint_rms_deg(cost.values.coordinates, inner.cost.values.coordinates)
+    found = Inner(problem, solved, cost_of_point(problem, solved.point))
+    return found if _is_new(learner, state, found) else None
+
+
+def _straight_rival(learner: Learner, state: State, stage: Stage) -> Inner | None:
+    """Return where a solve straight from X_T ends, if that is none of the known optima."""
+    found = learner.state(state.place, stage, [(learner.learning.controls, None)]).inners[0]
+    return found if _is_new(learner, state, found) else None
+
+
+def _is_new(learner: Learner, state: State, found: Inner) -> bool:
+    return all(
+        joint_rms_deg(found.cost.values.coordinates, inner.cost.values.coordinates)
+        > learner.settings.new_deg
         for inner in state.inners
-    ]
-    return Inner(problem, solved, cost) if min(away) > settings.new_deg else None
+    )
 
 
 def _stage(
