@@ -59,7 +59,7 @@ class OurSettings:
     iterations, tolerance, barrier : of inner solves; a step whose solve ends above `usable` is
         refused.
     damping : of the normal equations, relative. least_gain : of the objective, below which a stage
-        ends.
+        ends; of a step that may be half as long, half.
     rounds, round_steps, round_gain : of solves that go their own way, steps after each, and the
         springs' gain in them. most_optima : known of one θ at once. new_deg : how far from all
         others an optimum counts as another one. final_steps : at the paper's gain.

@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 MOST_REFUSALS, MOST_FREE_REFUSALS = 2, 5
 # Of what the linear model promised: above, the next step may be longer; below, it is shorter.
 GOOD_SHARE, POOR_SHARE, MOST_TRUST = 0.6, 0.25, 8.0
+LEAST_TRUST = 0.5  # of a round to begin with: what the last one refused need not be refused again
 JUMP = 2.0  # of the objective: the pull fell too far at once, X_S went elsewhere
 FREE_RATIO = 16.0  # κ = 0 counts as that much less than the last κ where one between is sought
 
@@ -128,7 +129,7 @@ def _rounds(
         if not learnable or learner.spent(free):
             break
         before = state
-        state, trust = _stage(learner, state, free, trust, record)
+        state, trust = _stage(learner, state, free, max(trust, LEAST_TRUST), record)
         state, learnable = _held(learner, state, free, record, _rival)
         if state is before:
             break
@@ -230,6 +231,7 @@ def _stage(
         if learner.spent(stage):
             break
         step, promised = learner.step(state, jacobian, trust)
+        share = min(1.0, trust)
         moves = [(by_style @ step).reshape(-1, COUNT) for by_style in controls]
         starts = [
             (inner.result.point.controls + move, inner.result)
@@ -251,7 +253,7 @@ def _stage(
         elif kept < POOR_SHARE:
             trust *= 0.5
         refused, state = 0, _distinct(learner, found, stage)
-        if gained < learner.settings.least_gain:
+        if gained < share * learner.settings.least_gain:
             break
         jacobian, controls = learner.linearised(state)
     return state, min(1.0, 2 * trust)
