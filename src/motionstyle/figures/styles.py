@@ -91,7 +91,7 @@ def style_compared_figure(pairs: Sequence[tuple[str, Style, str, Style]]) -> Fig
     if not pairs:
         return blank_figure("no two styles to compare were learnt")
     lines = joint_lines()
-    figure = new_figure(4.2 * len(pairs))
+    figure = new_figure(3.1 * len(pairs))
     for part, (name, style, other_name, other) in zip(
         np.atleast_1d(figure.subfigures(len(pairs), 1)), pairs, strict=True
     ):
