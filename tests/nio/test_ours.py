@@ -200,11 +200,11 @@ def test_a_solve_that_was_cut_off_gives_way_to_an_optimum(learner, state, monkey
     cut = replace(inner, result=replace(inner.result, optimality=1.0))
     poor = learner.judged(state.place, state.style, PULLED, [cut])
     monkeypatch.setattr(ours, "_rival", lambda *_: inner)
-    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None)
+    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None, ours._rival)
     assert learnable
     assert held.inners == (inner,)
     monkeypatch.setattr(ours, "_rival", lambda *_: cut)
-    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None)
+    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None, ours._rival)
     assert not learnable
     assert held is poor
 
