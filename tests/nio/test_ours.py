@@ -9,7 +9,7 @@ import pytest
 
 from motionstyle.configuration import read_settings
 from motionstyle.errors import MotionStyleError
-from motionstyle.nio import ours
+from motionstyle.nio import optima, ours
 from motionstyle.nio.inner import InnerSettings, inner_solve
 from motionstyle.nio.optima import Learner, Stage
 from motionstyle.nio.settings import our_settings
@@ -135,6 +135,77 @@ def test_where_all_optima_jumped_all_are_compared(learner, state):
     assert reached.objective == pytest.approx(found.objective)
 
 
+def test_all_multipliers_are_kept_only_without_a_pull(learner, state, monkeypatch):
+    kept = []
+
+    def solve(_learning, _style, how, *_):
+        kept.append(how.whole)
+        return state.inners[0]
+
+    monkeypatch.setattr(optima, "inner_solve", solve)
+    result = state.inners[0].result
+    cut_off = replace(result, status="iteration limit")
+    for closeness, before in ((1e-5, result), (0.0, cut_off), (0.0, None), (0.0, result)):
+        learner.state(state.place, replace(PULLED, closeness=closeness), [(None, before)])
+    assert kept == [False, False, False, True]
+
+
+@pytest.mark.parametrize(("trust", "taken"), [(1.0, 1), (0.25, 6)])
+def test_a_stage_does_not_end_for_a_step_that_had_to_be_short(
+    learner, state, settings, monkeypatch, trust, taken
+):
+    """Each step gains 1 % and half of what was promised, which leaves the trust as it is."""
+    gains, records = iter(range(99)), []
+
+    def compared(_learner, _state, found, *_):
+        before = state.objective * 0.99 ** next(gains)
+        return before, 0.99 * before, found
+
+    one = Learner(learner.learning, replace(settings, least_gain=0.02))
+    step = np.zeros_like(state.place)
+    still = np.zeros((state.inners[0].result.point.controls.size, len(step)))
+    monkeypatch.setattr(one, "linearised", lambda _state: (None, [still]))
+    monkeypatch.setattr(one, "step", lambda *_: (step, 0.98 * state.objective))
+    monkeypatch.setattr(one, "state", lambda *_: state)
+    monkeypatch.setattr(ours, "_compared", compared)
+    ours._stage(one, state, replace(PULLED, steps=6), trust, lambda *row: records.append(row))
+    assert len(records) == taken
+
+
+def test_a_round_does_not_begin_with_the_trust_that_refusals_left(
+    learner, state, settings, monkeypatch
+):
+    begun = []
+    monkeypatch.setattr(ours, "_held", lambda _learner, now, *_: (now, True))
+    monkeypatch.setattr(ours, "_stage", lambda *given: begun.append(given[3]) or (state, 0.01))
+    one = Learner(learner.learning, replace(settings, rounds=1))
+    for trust in (0.01, 0.9):
+        ours._rounds(one, state, PULLED, trust, lambda *_: None)
+    assert begun == [ours.LEAST_TRUST, 0.9]
+
+
+def test_the_last_steps_are_held_to_a_solve_straight_from_the_motion(
+    learner, state, settings, monkeypatch
+):
+    far = moved_by(state.inners[0], 0.3)
+    monkeypatch.setattr(ours, "_followed", lambda _learner, now, _stage: now)
+    monkeypatch.setattr(ours, "_rival", lambda *_: None)
+    monkeypatch.setattr(ours, "_straight_rival", lambda *_: far)
+    monkeypatch.setattr(ours, "_stage", lambda _learner, now, *_: (now, 1.0))
+    for work, optima_known in ((0, 2), (settings.most_work, 1)):
+        one = Learner(learner.learning, settings)
+        one.work = work
+        found = ours._finished(one, state, 1.0, lambda *_: None)
+        assert len(found.inners) == optima_known
+
+
+@pytest.mark.parametrize("name", ["rounds", "stages_work", "rounds_work", "most_work"])
+def test_what_a_schedule_lacks_is_named(shipped, name):
+    ours_part = dict(shipped["ours"], **{name: {"full": 1}})
+    with pytest.raises(MotionStyleError, match=f"{name}.*'quick'"):
+        our_settings(dict(shipped, ours=ours_part), "quick")
+
+
 @pytest.mark.parametrize(("first_away", "second_away"), [(0.5, 0.1), (0.1, 0.5)])
 def test_the_round_whose_own_solve_came_closest_is_kept(
     learner, state, settings, monkeypatch, first_away, second_away
@@ -195,16 +266,14 @@ def test_rounds_end_where_neither_a_step_nor_a_solve_finds_anything_new(
     assert len(begun) == 4
 
 
-def test_a_solve_that_was_cut_off_gives_way_to_an_optimum(learner, state, monkeypatch):
+def test_a_solve_that_was_cut_off_gives_way_to_an_optimum(learner, state):
     inner = state.inners[0]
     cut = replace(inner, result=replace(inner.result, optimality=1.0))
     poor = learner.judged(state.place, state.style, PULLED, [cut])
-    monkeypatch.setattr(ours, "_rival", lambda *_: inner)
-    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None, ours._rival)
+    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None, lambda *_: inner)
     assert learnable
     assert held.inners == (inner,)
-    monkeypatch.setattr(ours, "_rival", lambda *_: cut)
-    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None, ours._rival)
+    held, learnable = ours._held(learner, poor, PULLED, lambda *_: None, lambda *_: cut)
     assert not learnable
     assert held is poor
 

@@ -42,7 +42,7 @@ def turn_rates(motion: Motion) -> Array:
 
 
 def turning_frames(motion: Motion) -> NDArray[np.bool_]:
-    """Return in which frames the path's radius is below 15 m, (F,); none of a straight motion."""
+    """Return where the feet's path has a radius below 15 m, (F,); nowhere if it goes straight."""
     rates = turn_rates(motion)
     if abs(rates.sum()) / motion.rate_hz < np.radians(LEAST_TURN_DEG):
         return np.zeros(motion.frames, dtype=bool)
@@ -58,7 +58,7 @@ def _trunk(motion: Motion) -> Array:
 
 
 def lateral_leans(motion: Motion) -> Array:
-    """Return the trunk's lean to the left of the direction of travel, degrees, (F,)."""
+    """Return the trunk's lean to the left of the way the feet go, degrees, (F,)."""
     trunk = _trunk(motion)
     left = np.cross(_UP, travel_directions(motion, feet_path(motion)))
     return np.degrees(np.arctan2((trunk * left).sum(axis=1), trunk[:, 1]))

@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 MOST_REFUSALS, MOST_FREE_REFUSALS = 2, 5
 # Of what the linear model promised: above, the next step may be longer; below, it is shorter.
 GOOD_SHARE, POOR_SHARE, MOST_TRUST = 0.6, 0.25, 8.0
-LEAST_TRUST = 0.5  # of a round to begin with: what the last one refused need not be refused again
+LEAST_TRUST = 0.5  # of a round to begin with: refusals of the last one may have left hardly any
 JUMP = 2.0  # of the objective: the pull fell too far at once, X_S went elsewhere
 FREE_RATIO = 16.0  # κ = 0 counts as that much less than the last κ where one between is sought
 
@@ -153,21 +153,25 @@ def _finished(learner: Learner, state: State, trust: float, record: _Record) -> 
 
 
 def _held(
-    learner: Learner, state: State, free: Stage, record: _Record, rival_of: _Rival
+    learner: Learner, state: State, stage: Stage, record: _Record, rival_of: _Rival
 ) -> tuple[State, bool]:
     """Return the state judged by where a solve of its own leads, too, and whether to learn from it.
 
     A solve that was cut off tells nothing, and the state stays. Optima of its own that were cut
     off are dropped where there is another one.
+
+    Parameters
+    ----------
+    rival_of : the solve of its own; None where it finds nothing new.
     """
-    rival = rival_of(learner, state, free)
+    rival = rival_of(learner, state, stage)
     if rival is None or not learner.near_optimum(rival):
         return state, learner.usable(state)
     known = [one for one in state.inners if learner.near_optimum(one)]
     first, others = known[:1], known[1:]
     kept = others[max(0, len(others) - learner.settings.most_optima + 2) :]
-    held = learner.judged(state.place, state.style, free, [*first, *kept, rival])
-    record(held, free, True)
+    held = learner.judged(state.place, state.style, stage, [*first, *kept, rival])
+    record(held, stage, True)
     return held, learner.usable(held)
 
 
@@ -200,21 +204,19 @@ def _rival(learner: Learner, state: State, stage: Stage) -> Inner | None:
     )
     learner.count(solved)
     found = Inner(problem, solved, cost_of_point(problem, solved.point))
-    return found if _is_new(learner, state, found) else None
+    return found if _apart(found, state.inners, settings.new_deg) else None
 
 
 def _straight_rival(learner: Learner, state: State, stage: Stage) -> Inner | None:
     """Return where a solve straight from X_T ends, if that is none of the known optima."""
     found = learner.state(state.place, stage, [(learner.learning.controls, None)]).inners[0]
-    return found if _is_new(learner, state, found) else None
+    return found if _apart(found, state.inners, learner.settings.new_deg) else None
 
 
-def _is_new(learner: Learner, state: State, found: Inner) -> bool:
-    return all(
-        joint_rms_deg(found.cost.values.coordinates, inner.cost.values.coordinates)
-        > learner.settings.new_deg
-        for inner in state.inners
-    )
+def _apart(inner: Inner, others: Sequence[Inner], least_deg: float) -> bool:
+    """Tell whether a motion is farther than that from all others, rms over joints."""
+    here = inner.cost.values.coordinates
+    return all(joint_rms_deg(here, one.cost.values.coordinates) > least_deg for one in others)
 
 
 def _stage(
@@ -247,6 +249,7 @@ def _stage(
                 break
             continue
         gained = 1 - after / before
+        # The promise is of all optima, also where some did not stay: only the trust hangs on it.
         kept = (before - after) / max(state.objective - promised, 1e-12)
         if kept > GOOD_SHARE:
             trust = min(MOST_TRUST, 2 * trust)
@@ -262,12 +265,13 @@ def _stage(
 def _compared(
     learner: Learner, state: State, found: State, stage: Stage, moves: Sequence[Array]
 ) -> tuple[float, float, State]:
-    """Return the objective before and after a step of the optima that stayed, and all found.
+    """Return the objective before and after a step, of optima that stayed, and where it led.
 
     An optimum may cease to be one, and a solve from there ends elsewhere or is cut off. Were it
     taken for the same, no step would be better that lets a nearly vanished optimum go (CMU 08
-    stayed at 14° for it). What it leads to is held against the next step; what was cut off is found
-    again by a solve of its own, if it is there. Where none stayed, all are compared.
+    stayed at 14° for it). Where it led is held against the next step; a solve that was cut off is
+    left out, since one of its own finds its optimum again if there is one. Where no optimum stayed,
+    all that were found are held against all before.
 
     Parameters
     ----------
@@ -302,11 +306,7 @@ def _distinct(learner: Learner, state: State, stage: Stage) -> State:
     """Return the state without optima that have become one with an earlier one."""
     kept: list[Inner] = []
     for inner in state.inners:
-        here = inner.cost.values.coordinates
-        if all(
-            joint_rms_deg(here, other.cost.values.coordinates) > 0.5 * learner.settings.new_deg
-            for other in kept
-        ):
+        if _apart(inner, kept, 0.5 * learner.settings.new_deg):
             kept.append(inner)
     if len(kept) == len(state.inners):
         return state
