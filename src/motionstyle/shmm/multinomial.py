@@ -130,7 +130,7 @@ def _plain_cold(log_ratio: Array, live: NDArray[np.bool_], least: Array) -> Arra
         if (np.abs(following - level) <= 1e-15 * np.abs(level)).all():
             break
         level = following
-    return normalised(np.exp(state(level)[0]))
+    return _closed(np.exp(state(level)[0]))
 
 
 def _one_below(log_ratio: Array, least: float) -> Array:
@@ -152,7 +152,7 @@ def _one_below(log_ratio: Array, least: float) -> Array:
             break
         high = least + (high - least) * 2
     level = _bisect(lambda at: _log_sum(logs(at)), np.array([least]), high)
-    return normalised(np.exp(logs(level)))[0]
+    return _closed(np.exp(logs(level)))[0]
 
 
 def _upper(c: Array) -> Array:
@@ -180,6 +180,19 @@ def _lower_log(c: float) -> float:
         if abs(step) <= 1e-15 * max(z, 1e-12):
             break
     return -z
+
+
+def _closed(rows: Array) -> Array:
+    """Return rows that sum to one to rounding as rows that do, by their largest probability.
+
+    Where W₋₁ and W₀ meet, rounding of ℓ by ε moves the largest by √ε; scaling all would spread that
+    to small ones, whose ω/P it changes most, while the largest's own is stationary there.
+    """
+    result, every = rows.copy(), np.arange(len(rows))
+    largest = rows.argmax(axis=1)
+    result[every, largest] = 0.0
+    result[every, largest] = 1.0 - result.sum(axis=1)
+    return result
 
 
 def _log_sum(logs: Array) -> Array:
