@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from motionstyle.dynamics import codegen
+from motionstyle.dynamics import codegen, lanes
 from motionstyle.errors import MotionStyleError
-from motionstyle.files import read_json
+from motionstyle.files import read_json, write_json
 
 
 def functions():
@@ -42,16 +42,43 @@ def test_compiled_code_gives_what_the_virtual_machine_gives(tmp_path):
 
 @needs_compiler
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="these options are of x86")
-@pytest.mark.parametrize(("without", "lanes"), [("-mno-avx512f", (2, 4)), ("-mno-avx", (2,))])
-def test_narrower_processors_get_the_same_numbers(tmp_path, monkeypatch, without, lanes):
+@pytest.mark.parametrize(("without", "at_once"), [("-mno-avx512f", (2, 4)), ("-mno-avx", (2,))])
+def test_narrower_processors_get_the_same_numbers(tmp_path, monkeypatch, without, at_once):
     monkeypatch.setattr(codegen, "FLAGS", (*codegen.FLAGS, without))
     narrow = codegen.load_functions(functions, compiled(tmp_path, []))["small"]
     slow = codegen.load_functions(functions, None)["small"]
-    assert narrow.lanes in lanes
+    assert narrow.lanes in at_once
     for frames in (1, 2, 5, 9):  # more and fewer than lanes
         x = np.random.default_rng(frames).standard_normal((frames, 3))
         for one, other in zip(narrow(x, np.ones(2)), slow(x, np.ones(2)), strict=True):
             np.testing.assert_allclose(one, other, rtol=1e-14)
+
+
+@needs_compiler
+@pytest.mark.parametrize("assignments", [1, 3])
+def test_code_in_many_pieces_gives_the_same_numbers(tmp_path, monkeypatch, assignments):
+    monkeypatch.setattr(lanes, "PIECE", assignments)
+    cut = codegen.load_functions(functions, compiled(tmp_path, []))["small"]
+    slow = codegen.load_functions(functions, None)["small"]
+    for frames in (1, 8, 31, 32, 33, 70):  # more and fewer than go through a piece at once
+        x = np.random.default_rng(frames).standard_normal((frames, 3))
+        for one, other in zip(cut(x, np.ones(2)), slow(x, np.ones(2)), strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-14)
+
+
+def test_code_that_casadi_writes_otherwise_is_refused():
+    with pytest.raises(ValueError, match="no small as CasADi"):
+        lanes.in_lanes("static int casadi_f0(void) { return 0; }", ["small"])
+
+
+@needs_compiler
+def test_a_library_of_another_version_is_named(tmp_path):
+    where = compiled(tmp_path, [])
+    known = read_json(where)
+    known["functions"]["other"] = known["functions"]["small"]
+    write_json(where, known)
+    with pytest.raises(MotionStyleError, match=r"library\.json names functions .* delete it"):
+        codegen.load_functions(functions, where)
 
 
 @needs_compiler

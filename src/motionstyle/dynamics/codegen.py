@@ -185,20 +185,13 @@ class FrameFunction:
         def sizes(numbers: list[int]) -> ctypes.Array:
             return (ctypes.c_ssize_t * len(numbers))(*numbers)
 
-        # What the lanes read and write: one vector a number, each argument and result in a row.
-        wide = [*self.signature.inputs, *(len(rows) for rows in self.signature.rows)]
-        bytes_each = 8 * self.lanes
-        space = np.zeros(sum(wide) * self.lanes + self.lanes)
-        first = -(-space.ctypes.data // bytes_each) * bytes_each
-        ends = np.cumsum([0, *wide[:-1]])
         flag = self.loop(
             ctypes.c_ssize_t(frames),
             pointers(arrays),
             sizes([item.shape[1] if item.ndim == 2 else 0 for item in arrays]),
-            sizes(wide[: len(arrays)]),
+            sizes(self.signature.inputs),
             pointers(results),
-            sizes(wide[len(arrays) :]),
-            (ctypes.c_void_p * len(wide))(*(first + int(end) * bytes_each for end in ends)),
+            sizes([len(rows) for rows in self.signature.rows]),
         )
         if flag:
             raise ArithmeticError(f"{self.name} failed with flag {flag}")
@@ -223,14 +216,24 @@ def load_functions(
     build : returns the functions that were compiled; called only where there is no library,
         since the symbolic work takes seconds.
     description : what `compile_library` wrote, or None for the virtual machine.
+
+    Raises
+    ------
+    MotionStyleError
+        If another version of this package compiled them.
     """
     known = read_json(description) if description else {"library": None}
     where = known["library"]
     if where and Path(where).exists():
         library = ctypes.CDLL(where)
+        if not all(hasattr(library, f"{name}_in_lanes") for name in known["functions"]):
+            raise MotionStyleError(
+                f"{description} names functions that another version compiled; delete it, so that "
+                "the rule dynamics_code makes it anew"
+            )
         return {
             name: FrameFunction(
-                Signature(**fields), getattr(library, f"{name}_frames"), library.lanes_count()
+                Signature(**fields), getattr(library, f"{name}_in_lanes"), library.lanes_count()
             )
             for name, fields in known["functions"].items()
         }
