@@ -198,7 +198,7 @@ def leakage_figure(rows: Table, held_out: Mapping[str, Array]) -> Figure:
     ]
     note = "" if data == "captured" else " (planted motions: drawn, not claimed)"
     figure.suptitle(f"Relative leakage of held-out patterns{note}", x=0.01, ha="left")
-    figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, columnspacing=1.3)
     return figure
 
 

@@ -73,7 +73,7 @@ def style_sides_figure(style: Style, initial: Style, title: str) -> Figure:
             axis.plot(values[chosen], places, "o", ms=3.5, color=SIDE_COLOURS[side],
                       label=words[side])  # fmt: skip
             axis.plot(before[chosen], places, "|", ms=6, color="0.5",
-                      label="start of learning" if side == "r" else None)  # fmt: skip
+                      label=None if side else "start of learning")  # fmt: skip
     axes[0].axvline(1, color="0.8", lw=0.6, zorder=0)
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=4, fontsize="x-small")

@@ -45,7 +45,22 @@ def entropic_rows(evidence: Array, strength: Array | float) -> Array:
     ):
         if mask.any():
             result[mask] = solve(rows[mask], strengths[mask])
+    blurred = several & (strengths != 0) & (np.abs(strengths) < 1e-6 * rows.sum(axis=1))
+    result[blurred] = _sharpened(result[blurred], rows[blurred], strengths[blurred, None])
     return result
+
+
+def _sharpened(found: Array, evidence: Array, strength: Array) -> Array:
+    """Return rows after one Newton step on ω/P + Z log P = λ itself, which divides by no Z.
+
+    Only for evidence far above the prior, where the left side falls with every P.
+    """
+    live = found > 0
+    p = np.where(live, found, 1.0)
+    slope = np.where(live, evidence / p + strength * np.log(p), 0.0)
+    yields = np.where(live, p**2 / (evidence - strength * p), 0.0)
+    level = (slope * yields).sum(axis=1, keepdims=True) / yields.sum(axis=1, keepdims=True)
+    return normalised(found + (slope - level) * yields)
 
 
 def _hot_rows(evidence: Array, strength: Array) -> Array:
@@ -183,7 +198,7 @@ def _lower_log(c: float) -> float:
 
 
 def _closed(rows: Array) -> Array:
-    """Return rows that sum to one to rounding as rows that do, by their largest probability.
+    """Return rows whose sum is nearly one with the largest probability changed so that it is one.
 
     Where W₋₁ and W₀ meet, rounding of ℓ by ε moves the largest by √ε; scaling all would spread that
     to small ones, whose ω/P it changes most, while the largest's own is stationary there.
