@@ -42,7 +42,7 @@ def test_the_last_stage_is_the_problem_itself(result, problem, told):
     own = evaluator.values(result.point.controls, result.point.coefficients * FORCE_UNIT)
     assert own.energy == result.values.energy
     system = InteriorPoint(evaluator, SolverSettings()).system
-    error = system.error(result.point, own, evaluator.slopes(own), 0.0)
+    error = system.errors(result.point, own, evaluator.slopes(own)).at(0.0)
     assert error <= SolverSettings().tolerance
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motionstyle.spacetime import kernels
-from motionstyle.spacetime.frame_sums import ForceBlocks, FrameSums
+from motionstyle.spacetime.frame_sums import Curvature, ForceBlocks, FrameSums
 from motionstyle.spacetime.kernels import SIZE, compiled_kernels, scatter
 from motionstyle.spacetime.splines import SplineBasis
 
@@ -76,6 +76,8 @@ def dense_of(blocks):
 @pytest.mark.parametrize("wide", [WIDE, SIZE])
 def test_products_are_the_dense_ones(sums, design, wide):
     matrices = np.random.default_rng(1).standard_normal((FRAMES, 24, wide))
+    matrices[1::2, ::3] = 0.0  # rows of what does not count
+    matrices[2] = 0.0
     blocks = sums.nothing()
     sums.add_products(matrices, blocks)
     rows = matrices @ design[:, :wide]
@@ -83,15 +85,46 @@ def test_products_are_the_dense_ones(sums, design, wide):
     np.testing.assert_allclose(dense_of(blocks), expected, atol=1e-12 * np.abs(expected).max())
 
 
-def test_matrices_are_the_dense_ones_and_add_up(sums, design):
+def curvature_of(hessians):
+    """Full matrices as numbers of one triangle; those over q, which do not count, are spoilt."""
+    pattern = np.triu_indices(WIDE)
+    numbers = hessians[:, *pattern]
+    numbers[:, (pattern[0] < SIZE) & (pattern[1] < SIZE)] = np.nan
+    place = hessians[:, :SIZE, :SIZE]
+    return Curvature(np.ascontiguousarray(numbers), pattern, np.ascontiguousarray(place))
+
+
+def test_curvatures_are_the_dense_ones_and_add_up(sums, design):
     rng = np.random.default_rng(2)
     hessians = rng.standard_normal((FRAMES, WIDE, WIDE))
     hessians += np.swapaxes(hessians, 1, 2).copy()
+    np.testing.assert_array_equal(curvature_of(hessians).dense(), hessians)
     blocks = sums.nothing()
-    sums.add_matrices(hessians, blocks)
-    sums.add_matrices(hessians, blocks)
+    sums.add_curvature(curvature_of(hessians), blocks)
+    sums.add_curvature(curvature_of(hessians), blocks)
     expected = 2 * np.einsum("fuk,fuv,fvl->kl", design, hessians, design, optimize=True)
     np.testing.assert_allclose(dense_of(blocks), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_band_is_the_dense_matrix_with_what_is_added(sums):
+    rng = np.random.default_rng(3)
+    blocks = sums.nothing()
+    for k in range(sums.basis.controls):
+        for e in range(min(4, sums.basis.controls - k)):
+            blocks[k, e, :SIZE, :SIZE] = rng.standard_normal((SIZE, SIZE))
+    shift, dense = rng.standard_normal((len(blocks), 4)), dense_of(blocks)
+    size = len(dense)
+    added = rng.standard_normal(size)
+    for k, e in np.ndindex(shift.shape):
+        if k + e < len(blocks):
+            lines = np.arange(SIZE)
+            dense[(k + e) * SIZE + lines, k * SIZE + lines] += shift[k, e]
+    dense[np.arange(size), np.arange(size)] += added
+    band = sums.banded(blocks, shift, added)
+    assert band.shape == (4 * SIZE, size)
+    assert band.flags.f_contiguous
+    for k in range(4 * SIZE):
+        np.testing.assert_allclose(band[k, : size - k], np.diagonal(dense, -k), atol=1e-12)
 
 
 @pytest.mark.parametrize("delta", [0.0, 0.3])
@@ -123,7 +156,7 @@ def schur_complements(bearing, design, whole):
 
 def test_what_is_left_is_the_schur_complement(sums, bearing, design, whole):
     blocks = sums.nothing()
-    sums.add_matrices(np.ascontiguousarray(whole[:, :WIDE, :WIDE]), blocks)
+    sums.add_curvature(curvature_of(whole[:, :WIDE, :WIDE]), blocks)
     sums.eliminate(blocks, 0.0, parts(whole))
     wanted = schur_complements(bearing, design, whole)
     np.testing.assert_allclose(
@@ -136,7 +169,7 @@ def test_a_small_difference_of_large_numbers_is_kept(sums, design):
     every = FrameSums(sums.basis, np.full((FRAMES, FORCES), True), compiled=bool(sums.library))
     whole = stiff(rows=30)
     blocks = every.nothing()
-    every.add_matrices(np.ascontiguousarray(whole[:, :WIDE, :WIDE]), blocks)
+    every.add_curvature(curvature_of(whole[:, :WIDE, :WIDE]), blocks)
     large = np.abs(blocks).max()
     every.eliminate(blocks, 0.0, parts(whole))
     wanted = schur_complements(np.full((FRAMES, FORCES), True), design, whole)
@@ -177,5 +210,5 @@ def test_numbers_go_to_their_places(monkeypatch, compiler):
     if not compiler:
         monkeypatch.setattr(kernels, "compiled_kernels", lambda: None)
     to = np.zeros((2, 2, 3))
-    scatter(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([4, 0]), to)
+    scatter(np.array([[1.0, 2.0, 9.0], [3.0, 4.0, 9.0]]), np.array([4, 0]), to)
     assert to.tolist() == [[[2, 0, 0], [0, 1, 0]], [[4, 0, 0], [0, 3, 0]]]

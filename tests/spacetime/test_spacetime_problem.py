@@ -94,10 +94,11 @@ def test_gradient_and_hessian_are_those_of_finite_differences(rough):
         assert exact == pytest.approx(numeric, rel=1e-6)
         up, down = (slopes_of(evaluator, *p, y, y_feet, pushes) for p in (ahead, behind))
         state = spread(evaluator.basis, move)
-        bent_state = np.einsum("fuv,fv->fu", hessian, state)
-        bent_state += np.einsum("ful,fl->fu", mixed, force)
+        bent_state = np.einsum("fuv,fv->fu", hessian.dense(), state)
+        bent_state[:, :35] += np.einsum("ful,fl->fu", mixed, force)
         exact_parts = (
-            assemble_gradient(evaluator.basis, bent_state), np.einsum("ful,fu->fl", mixed, state)
+            assemble_gradient(evaluator.basis, bent_state),
+            np.einsum("ful,fu->fl", mixed, state[:, :35]),
         )  # fmt: skip
         for found, plus, minus in zip(exact_parts, up, down, strict=True):
             numeric = (plus - minus) / (2 * h)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
@@ -15,26 +13,10 @@ from motionstyle.spacetime.splines import SplineBasis
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class BandedHessian:
-    """A symmetric matrix over control points of n coordinates, half-bandwidth 4n − 1.
-
-    band : lower band as LAPACK wants it, (4n, K·n), Fortran order.
-    """
-
-    band: Array
-
-    @staticmethod
-    def of(blocks: Array) -> BandedHessian:
-        """Return the matrix whose block of control points k and k + e is blocks[k, e], (n, n)."""
-        return BandedHessian(_laid_out(blocks))
-
-    def factor(self, added: Array | float = 0.0) -> Array | None:
-        """Return the Cholesky factor of matrix + diag(added), or None if it is not positive."""
-        band = self.band.copy(order="F")
-        band[0] += added
-        factor, info = dpbtrf(band, lower=1, overwrite_ab=1)
-        return None if info else factor
+def factor(band: Array) -> Array | None:
+    """Return the Cholesky factor of a lower band, in its place; None if it is not positive."""
+    found, info = dpbtrf(band, lower=1, overwrite_ab=1)
+    return None if info else found
 
 
 def solve(factor: Array, right: Array, columns: bool = False) -> Array:
@@ -48,8 +30,11 @@ def solve(factor: Array, right: Array, columns: bool = False) -> Array:
     return found.reshape(right.shape)
 
 
-def _laid_out(blocks: Array) -> Array:
-    """Return a lower band, (4n, K·n), Fortran order, from blocks (K, 4, n, n).
+def laid_out(blocks: Array, shift: Array) -> Array:
+    """Return blocks (K, 4, n, n) of control points k and k + e as a lower band, (4n, K·n).
+
+    Half-bandwidth 4n − 1, in Fortran order, as LAPACK wants it. shift (K, 4) is added to each
+    block's diagonal.
 
     blocks : H[k·n + b, (k + e)·n + a] at [k, e, b, a]: by symmetry also what the band holds in
     column k·n + b, where a runs along memory.
@@ -64,7 +49,9 @@ def _laid_out(blocks: Array) -> Array:
     as_strided(store, (controls, n, n), strides)[...] = np.triu(blocks[:, 0])
     for e in range(1, 4):
         as_strided(store[e * n :], (controls, n, n), strides)[...] = blocks[:, e]
-    return store.reshape(controls * n, height).T
+    band = store.reshape(controls * n, height).T
+    band[::n] += np.repeat(shift, n, axis=0).T
+    return band
 
 
 def assemble_gradient(basis: SplineBasis, gradients: Array) -> Array:

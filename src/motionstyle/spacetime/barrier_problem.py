@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +94,8 @@ class BarrierProblem:
         pull[:, evaluator.limited] += scaled[:, :n] - scaled[:, n : 2 * n]
         return pull
 
-    def error(self, point: Point, values: Values, slopes: Slopes, barrier: float) -> float:
-        """Return the scaled optimality error, Wächter & Biegler eq. (5)."""
+    def errors(self, point: Point, values: Values, slopes: Slopes) -> Errors:
+        """Return the scaled optimality errors at a point, Wächter & Biegler eq. (5)."""
         gradient = self.pull(slopes, point.multiplier, point.foot_multiplier, point.row_dual)
         gradient[:, :COUNT] += self.evaluator.tracking_pull(values.coordinates)
         by_controls = assemble_gradient(self.evaluator.basis, gradient)
@@ -124,9 +124,24 @@ class BarrierProblem:
             np.abs(values.residuals - point.lift).max(),
             np.abs(values.foot_residuals - point.foot_lift).max(),
             np.abs(values.inequalities + point.elastic - point.slack)[self.active].max(initial=0.0),
-            np.abs(gaps - barrier).max(initial=0.0) / scale_gap,
         ]
-        return float(max(parts))
+        return Errors(float(max(parts)), gaps, scale_gap)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """The optimality errors of a point: the largest that no barrier changes, and the gaps.
+
+    gaps : primal times dual of λ and rows, which should be μ. scale : what they are divided by.
+    """
+
+    largest: float
+    gaps: Array
+    scale: float
+
+    def at(self, barrier: float) -> float:
+        """Return the scaled error of the barrier problem."""
+        return max(self.largest, float(np.abs(self.gaps - barrier).max(initial=0.0) / self.scale))
 
 
 def _metric(basis: SplineBasis) -> Array:

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from motionstyle.spacetime.kernels import FORCES, HIGH, SIZE, WIDE, compiled_kernels, plain
+from motionstyle.spacetime.banded import laid_out
+from motionstyle.spacetime.kernels import FORCES, HIGH, SIZE, WIDE, Whole, compiled_kernels, plain
 from motionstyle.spacetime.splines import SplineBasis
 
 Array = NDArray[np.float64]
@@ -37,6 +38,27 @@ class ForceBlocks:
     diagonal: Array
     mixed: Array
     mixed_place: Array
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """Symmetric second derivatives over u = (q, q̇, q̈), as the few numbers that are not 0.
+
+    numbers : (F, n), at `pattern`, rows and columns (n,), of one triangle of (105, 105). Those
+    over q alone do not count: they are in `place`, whole, (F, 35, 35).
+    """
+
+    numbers: Array
+    pattern: tuple[Whole, Whole]
+    place: Array
+
+    def dense(self) -> Array:
+        """Return them as matrices (F, 105, 105)."""
+        rows, columns = self.pattern
+        found = np.zeros((len(self.numbers), 3 * SIZE, 3 * SIZE))
+        found[:, rows, columns] = found[:, columns, rows] = self.numbers
+        found[:, :SIZE, :SIZE] = self.place
+        return found
 
 
 class FrameSums:
@@ -76,17 +98,32 @@ class FrameSums:
         for t in range(frames):
             self._add_gram(t, matrices[t], 1.0, blocks)
 
-    def add_matrices(self, hessians: Array, blocks: Array) -> None:
+    def add_curvature(self, curvature: Curvature, blocks: Array) -> None:
         """Add Σ_t Φᵀ H Φ of symmetric H (F, 105, 105)."""
         if self.library is not None:
-            self.library.add_matrices(
-                *plain(len(hessians), self.first, self.weights, hessians, blocks)
+            parts, (rows, columns) = curvature, curvature.pattern
+            sizes = plain(len(parts.numbers), self.first, self.weights, len(rows))
+            self.library.add_curvature(
+                *sizes, *plain(rows, columns, parts.numbers, parts.place, blocks)
             )
             return
-        for t, hessian in enumerate(hessians):
+        for t, hessian in enumerate(curvature.dense()):
             w, split = self.weights[t], hessian.reshape(3, SIZE, 3, SIZE)
             local = np.einsum("dc,danb,nk->ckab", w, split, w, optimize=True)
             self._add_local(t, local, blocks)
+
+    def banded(self, blocks: Array, shift: Array, added: Array) -> Array:
+        """Return a matrix's blocks as a lower band (140, K·35), see `banded`.
+
+        shift : added to each block's diagonal, (K, 4). added : to the whole's, (K·35,).
+        """
+        if self.library is None:
+            band = laid_out(blocks[:, :, :SIZE, :SIZE], shift)
+            band[0] += added
+            return band
+        store = np.empty((len(added), 4 * SIZE))
+        self.library.lay_out(*plain(len(blocks), blocks, shift, added, store))
+        return store.T
 
     def eliminate(self, blocks: Array, delta: float, forces: ForceBlocks) -> Eliminated:
         """Take λ out of a Hessian's blocks at δ, in place, and return how.

@@ -19,7 +19,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.spacetime.barrier_problem import BarrierProblem
+from motionstyle.spacetime.barrier_problem import BarrierProblem, Errors
 from motionstyle.spacetime.newton_step import (
     Blocks,
     Factor,
@@ -50,12 +50,16 @@ PACE_OVER, PACE_BELOW = 10, 1e3  # iterations over which E's fall is judged; not
 
 @dataclass(frozen=True)
 class _Trial:
-    """A point that was accepted, and length and nonlinearity of the step that led to it."""
+    """A point that was accepted, and length and nonlinearity of the step that led to it.
+
+    slopes : there, where accepting it needed them.
+    """
 
     point: Point
     values: Values
     length: float
     nonlinearity: float = 0.0
+    slopes: Slopes | None = None
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,7 @@ class _Here:
     """Where a step starts from: the point, its errors, objective and their limits."""
 
     point: Point
+    errors: Errors
     excess: Excess
     phi: float
     theta: float
@@ -104,9 +109,11 @@ class InteriorPoint:
         limits = (1e4 * max(1.0, theta), 1e-4 * max(1.0, theta))
         filter_: list[tuple[float, float]] = []
         length = delta = bent = 0.0
+        slopes = None
         while True:
-            slopes = self.evaluator.slopes(values)
-            error = system.error(point, values, slopes, 0.0)
+            slopes = slopes or self.evaluator.slopes(values)
+            errors = system.errors(point, values, slopes)
+            error = errors.at(0.0)
             excess, phi = system.excess(point, values), system.objective(point, barrier)
             spent = perf_counter() - began
             trace.append(
@@ -120,16 +127,17 @@ class InteriorPoint:
             status = self._verdict(trace)
             if status:
                 break
-            lower = self._lowered(barrier, point, values, slopes)
+            lower = self._lowered(barrier, errors)
             if lower < barrier:
                 barrier, filter_ = lower, []
                 if self.settings.whole_steps:
                     point = system.settled(point, values, barrier)
+                    errors = system.errors(point, values, slopes)
                 excess, phi = system.excess(point, values), system.objective(point, barrier)
-            here = _Here(point, excess, phi, excess.total(), barrier, limits)
+            here = _Here(point, errors, excess, phi, excess.total(), barrier, limits)
             blocks = newton_blocks(system, point, values, slopes, barrier)
             try:
-                accepted, delta = self._stepped(here, blocks, wanted, last, values, filter_)
+                accepted, delta = self._stepped(here, blocks, wanted, last, filter_)
             except FloatingPointError:
                 status = "not a number"
                 break
@@ -141,6 +149,7 @@ class InteriorPoint:
                 point, length, filter_ = self._closed(point, values, barrier), 0.0, []
                 continue
             length, values, bent = accepted.length, accepted.values, accepted.nonlinearity
+            slopes = accepted.slopes
             point = self._safe_duals(accepted.point, barrier)
             last, wanted = delta or last, self._next_delta(delta, bent)
         spent = perf_counter() - began
@@ -152,7 +161,6 @@ class InteriorPoint:
         blocks: Blocks,
         wanted: float,
         last: float,
-        values: Values,
         filter_: list[tuple[float, float]],
     ) -> tuple[_Trial | None, float]:
         """Return the step that is taken, or None, and its δ, raised until a step is accepted."""
@@ -162,7 +170,7 @@ class InteriorPoint:
             step, slope = newton_step(self.system, here.point, blocks, factor, here.excess)
             found = self._search(here, blocks, factor, step, slope, filter_)
             if found is None and first:
-                found = self._restored(here, values, blocks.slopes, step)
+                found = self._restored(here, step)
                 if found is not None:
                     filter_.clear()
             if found is not None or factor.delta > STIFFEST:
@@ -197,14 +205,11 @@ class InteriorPoint:
                 return "slow"
         return None
 
-    def _lowered(self, barrier: float, point: Point, values: Values, slopes: Slopes) -> float:
+    def _lowered(self, barrier: float, errors: Errors) -> float:
         """Return the barrier for the next step: lower where its problem is solved well enough."""
         settings = self.settings
         least = settings.tolerance / (settings.barrier_gate + 1)
-        while (
-            barrier > least
-            and self.system.error(point, values, slopes, barrier) <= settings.barrier_gate * barrier
-        ):
+        while barrier > least and errors.at(barrier) <= settings.barrier_gate * barrier:
             barrier = max(
                 least, min(settings.barrier_shrink * barrier, barrier**settings.barrier_power)
             )
@@ -269,7 +274,7 @@ class InteriorPoint:
             return True
         return False
 
-    def _restored(self, here: _Here, values: Values, slopes: Slopes, step: Point) -> _Trial | None:
+    def _restored(self, here: _Here, step: Point) -> _Trial | None:
         """Return the whole step if it lowers the barrier problem's error, or None.
 
         The soft restoration of Wächter & Biegler §3.3: near an optimum φ and θ change by less
@@ -279,9 +284,10 @@ class InteriorPoint:
             moved, found, length = self._moved(here, step)
         if not np.isfinite(found.residuals).all() or np.abs(found.residuals).max() > 1e100:
             return None
-        before = self.system.error(here.point, values, slopes, here.barrier)
-        after = self.system.error(moved, found, self.evaluator.slopes(found), here.barrier)
-        return _Trial(moved, found, length) if after <= 0.9 * before else None
+        slopes = self.evaluator.slopes(found)
+        after = self.system.errors(moved, found, slopes).at(here.barrier)
+        fell = after <= 0.9 * here.errors.at(here.barrier)
+        return _Trial(moved, found, length, slopes=slopes) if fell else None
 
     def _moved(self, here: _Here, step: Point) -> tuple[Point, Values, float]:
         """Return the point a step away, its values, and the step's length."""
@@ -330,7 +336,7 @@ class InteriorPoint:
         """Return the longest step, at most 1, that keeps `fraction` of each value's way to 0."""
         length = 1.0
         for value, step, where in pairs:
-            falling = where & (step < 0)
-            if falling.any():
-                length = min(length, float((fraction * value[falling] / -step[falling]).min()))
-        return length
+            with np.errstate(divide="ignore", invalid="ignore"):  # where nothing falls
+                lengths = fraction * value / -step
+            length = lengths.min(where=where & (step < 0), initial=length)
+        return float(length)

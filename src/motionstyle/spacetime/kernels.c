@@ -13,16 +13,24 @@
 #define ROWS N /* most rows of one frame: residuals */
 typedef double vec __attribute__((vector_size(64), aligned(8)));
 
-/* Rows over u (wide = 3 N) or q (wide = N) as rows over four control points. */
-static void spread_rows(const double *weights, ptrdiff_t rows, ptrdiff_t wide, const double *from,
-                        double (*to)[4][WIDE]) {
-  memset(to, 0, sizeof(double) * rows * 4 * WIDE);
-  for (ptrdiff_t r = 0; r < rows; ++r)
+/* Rows over u (wide = 3 N) or q (wide = N) as rows over four control points, and how many are left
+   without those that are all 0: rows of feet in the air. */
+static ptrdiff_t spread_rows(const double *weights, ptrdiff_t rows, ptrdiff_t wide,
+                             const double *from, double (*to)[4][WIDE]) {
+  ptrdiff_t left = 0;
+  for (ptrdiff_t r = 0; r < rows; ++r, from += wide) {
+    int some = 0;
+    for (ptrdiff_t a = 0; a < wide; ++a) some |= from[a] != 0;
+    if (!some) continue;
+    memset(to[left], 0, sizeof to[left]);
     for (ptrdiff_t d = 0; d * N < wide; ++d)
       for (int c = 0; c < 4; ++c) {
-        const double weight = weights[4 * d + c], *row = from + r * wide + d * N;
-        for (int a = 0; a < N; ++a) to[r][c][a] += weight * row[a];
+        const double weight = weights[4 * d + c], *row = from + d * N;
+        for (int a = 0; a < N; ++a) to[left][c][a] += weight * row[a];
       }
+    ++left;
+  }
+  return left;
 }
 
 /* blocks[c][e] += sign * X_c' X_{c+e}. */
@@ -47,27 +55,40 @@ void add_products(ptrdiff_t frames, const ptrdiff_t *first, const double *weight
                   ptrdiff_t wide, const double *matrices, double *blocks) {
   double x[ROWS][4][WIDE];
   for (ptrdiff_t t = 0; t < frames; ++t) {
-    spread_rows(weights + 12 * t, rows, wide, matrices + t * rows * wide, x);
-    add_gram(rows, x, 1.0, blocks + first[t] * 4 * BLOCK);
+    const ptrdiff_t left = spread_rows(weights + 12 * t, rows, wide, matrices + t * rows * wide, x);
+    add_gram(left, x, 1.0, blocks + first[t] * 4 * BLOCK);
   }
 }
 
-void add_matrices(ptrdiff_t frames, const ptrdiff_t *first, const double *weights,
-                  const double *matrices, double *blocks) {
+/* blocks += the sums of symmetric matrices over u: `numbers` at (rows, columns) and mirrored there,
+   but what is over q alone, which is given whole. */
+void add_curvature(ptrdiff_t frames, const ptrdiff_t *first, const double *weights, ptrdiff_t n,
+                   const ptrdiff_t *rows, const ptrdiff_t *columns, const double *numbers,
+                   const double *place, double *blocks) {
+  static const vec none;
+  double matrix[3 * N][3][WIDE] = {{{0}}}, *at[n], *mirrored[n]; /* the same for all frames */
+  for (ptrdiff_t k = 0; k < n; ++k) {
+    const ptrdiff_t i = rows[k], j = columns[k];
+    at[k] = &matrix[i][j / N][j % N];
+    mirrored[k] = &matrix[j][i / N][i % N];
+  }
   for (ptrdiff_t t = 0; t < frames; ++t) {
-    const double *w = weights + 12 * t, *matrix = matrices + t * 9 * N * N;
-    double *own = blocks + first[t] * 4 * BLOCK;
-    for (int d = 0; d < 3; ++d)
-      for (int b = 0; b < N; ++b) {
-        const double *row = matrix + (d * N + b) * 3 * N;
-        for (int c = 0; c < 4; ++c)
-          for (int e = 0; c + e < 4; ++e) {
-            const double left = w[4 * d + c], w0 = left * w[c + e], w1 = left * w[4 + c + e],
-                         w2 = left * w[8 + c + e];
-            double *to = own + (4 * c + e) * BLOCK + b * WIDE;
-            for (int a = 0; a < N; ++a) to[a] += w0 * row[a] + w1 * row[N + a] + w2 * row[2 * N + a];
+    for (ptrdiff_t k = 0; k < n; ++k) *at[k] = *mirrored[k] = numbers[t * n + k];
+    for (int b = 0; b < N; ++b) memcpy(matrix[b][0], place + (t * N + b) * N, sizeof(double) * N);
+    const double *w = weights + 12 * t;
+    for (int b = 0; b < N; ++b)
+      for (int c = 0; c < 4; ++c)
+        for (int e = 0; c + e < 4; ++e) {
+          vec *to = (vec *)(blocks + (4 * (first[t] + c) + e) * BLOCK + b * WIDE);
+          for (int d = 0; d < 3; ++d) {
+            const vec *row = (const vec *)matrix[d * N + b];
+            const double left = w[4 * d + c];
+            const vec w0 = none + left * w[c + e], w1 = none + left * w[4 + c + e],
+                      w2 = none + left * w[8 + c + e];
+            for (int j = 0; j < VECTORS; ++j)
+              to[j] += w0 * row[j] + w1 * row[VECTORS + j] + w2 * row[2 * VECTORS + j];
           }
-      }
+        }
   }
 }
 
@@ -96,8 +117,8 @@ int eliminate(ptrdiff_t frames, const ptrdiff_t *first, const double *weights,
       for (int a = 0; a < 3 * N; ++a) compact[i][a] /= l[i * MOST + i];
       memcpy(half + p * 3 * N, compact[i], sizeof compact[i]);
     }
-    spread_rows(weights + 12 * t, n, 3 * N, compact[0], x);
-    add_gram(n, x, -1.0, blocks + first[t] * 4 * BLOCK);
+    const ptrdiff_t left = spread_rows(weights + 12 * t, n, 3 * N, compact[0], x);
+    add_gram(left, x, -1.0, blocks + first[t] * 4 * BLOCK);
   }
   return 0;
 }
@@ -124,9 +145,25 @@ void substitute(ptrdiff_t frames, const ptrdiff_t *count, const ptrdiff_t *at, c
   }
 }
 
-/* Numbers (frames, n) to places of matrices that lie end to end, `size` numbers a frame. */
-void scatter(ptrdiff_t frames, ptrdiff_t n, ptrdiff_t size, const ptrdiff_t *places,
+/* The first n of each frame's `all` numbers to places of matrices that lie end to end, `size`
+   numbers a frame. */
+void scatter(ptrdiff_t frames, ptrdiff_t n, ptrdiff_t all, ptrdiff_t size, const ptrdiff_t *places,
              const double *numbers, double *to) {
   for (ptrdiff_t t = 0; t < frames; ++t)
-    for (ptrdiff_t k = 0; k < n; ++k) to[t * size + places[k]] = numbers[t * n + k];
+    for (ptrdiff_t k = 0; k < n; ++k) to[t * size + places[k]] = numbers[t * all + k];
+}
+
+/* Blocks as columns of a lower band, 4 N high: shift (controls, 4) is added to each block's
+   diagonal, `added` to the band's. */
+void lay_out(ptrdiff_t controls, const double *blocks, const double *shift, const double *added,
+             double *band) {
+  for (ptrdiff_t k = 0; k < controls; ++k)
+    for (ptrdiff_t b = 0; b < N; ++b, band += 4 * N) {
+      const double *from = blocks + k * 4 * BLOCK + b * WIDE;
+      memcpy(band, from + b, sizeof(double) * (N - b));
+      for (ptrdiff_t e = 1; e < 4; ++e) memcpy(band + e * N - b, from + e * BLOCK, sizeof(double) * N);
+      memset(band + 4 * N - b, 0, sizeof(double) * b);
+      for (ptrdiff_t e = 0; e < 4; ++e) band[e * N] += shift[4 * k + e];
+      band[0] += added[k * N + b];
+    }
 }

@@ -42,13 +42,17 @@ def compiled_kernels() -> ctypes.CDLL | None:
 
 
 def scatter(numbers: Array, places: Whole, to: Array) -> None:
-    """Put numbers (F, n) to places (n,) of each frame's matrix of `to` (F, rows, columns)."""
+    """Put the first numbers of (F, n) to places of each frame's matrix of `to`.
+
+    places : (m ≤ n,), in the matrix laid end to end. to : (F, rows, columns).
+    """
     library = compiled_kernels()
     if library is None:
-        to.reshape(len(to), -1)[:, places] = numbers
+        to.reshape(len(to), -1)[:, places] = numbers[:, : len(places)]
     else:
         size = to.shape[1] * to.shape[2]
-        library.scatter(*plain(len(to), len(places), size, places, numbers, to))
+        sizes = plain(len(to), len(places), numbers.shape[1], size)
+        library.scatter(*sizes, *plain(places, numbers, to))
 
 
 def plain(*values: Array | Whole | float | int) -> list[ctypes._SimpleCData]:

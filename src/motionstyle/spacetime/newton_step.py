@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motionstyle.spacetime.banded import BandedHessian, assemble_gradient, solve, spread
+from motionstyle.spacetime.banded import assemble_gradient, factor, solve, spread
 from motionstyle.spacetime.barrier_problem import BarrierProblem
 from motionstyle.spacetime.frame_sums import Eliminated, ForceBlocks
 from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
@@ -60,8 +60,7 @@ def newton_blocks(
     """Return the parts of the Newton system that do not depend on the regularisation."""
     evaluator = system.evaluator
     n = len(evaluator.limited)
-    q, at = slice(0, COUNT), evaluator.limited
-    by_state = slopes.by_state
+    at, by_state = evaluator.limited, slopes.by_state
     by_force = FORCE_UNIT * slopes.by_coefficients
     pushes = -point.row_dual[:, 2 * n :] * evaluator.row_scale[2 * n :]
     bend, mixed = evaluator.curvature(
@@ -75,13 +74,14 @@ def newton_blocks(
     stiff = np.where(system.active, point.row_dual / firm, 0.0)
     stiff_scaled = stiff * evaluator.row_scale**2
     up = slopes.heights * stiff_scaled[:, 2 * n :, None]
-    bend[:, q, q] += np.swapaxes(slopes.heights, 1, 2) @ up
-    bend[:, at, at] += stiff_scaled[:, :n] + stiff_scaled[:, n : 2 * n]
+    place = bend.place
+    place += np.swapaxes(slopes.heights, 1, 2) @ up
+    place[:, at, at] += stiff_scaled[:, :n] + stiff_scaled[:, n : 2 * n]
     tracking = evaluator.problem.tracking
     if tracking is not None:
         joints = np.arange(COUNT)
-        bend[:, joints, joints] += tracking.weights
-    system.sums.add_matrices(bend, curved)
+        place[:, joints, joints] += tracking.weights
+    system.sums.add_curvature(bend, curved)
     safe = np.where(system.bearing, point.coefficients, 1.0)
     pull = np.where(system.bearing, system.force_weight * point.coefficients - barrier / safe, 0.0)
     return Blocks(
@@ -92,7 +92,7 @@ def newton_blocks(
             inner=np.swapaxes(by_force, 1, 2) @ by_force,
             diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
             mixed=np.swapaxes(by_force, 1, 2) @ by_state,
-            mixed_place=FORCE_UNIT * np.ascontiguousarray(np.swapaxes(mixed[:, q], 1, 2)),
+            mixed_place=FORCE_UNIT * np.ascontiguousarray(np.swapaxes(mixed, 1, 2)),
         ),
         track_pull=evaluator.tracking_pull(values.coordinates),
         force_pull=pull,
@@ -133,11 +133,9 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     total = (1 + delta) * blocks.gauss
     total += blocks.curved
     eliminated = system.sums.eliminate(total, delta, blocks.forces)
-    total = total[:, :, :COUNT, :COUNT]
-    np.einsum("...ii->...i", total)[...] += delta * system.metric[..., None]
     fixed = np.where(system.fixed, RIGID, 0.0).ravel()
-    factor = BandedHessian.of(total).factor(fixed + delta)
-    return None if factor is None else Factor(factor, eliminated, delta)
+    found = factor(system.sums.banded(total, delta * system.metric, fixed + delta))
+    return None if found is None else Factor(found, eliminated, delta)
 
 
 def newton_step(

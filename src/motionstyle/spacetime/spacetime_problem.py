@@ -29,6 +29,7 @@ from motionstyle.dynamics.symbols import parameter_vector
 from motionstyle.errors import MotionStyleError
 from motionstyle.spacetime.foot_constraints import FootConstraints
 from motionstyle.spacetime.forces import cone_basis
+from motionstyle.spacetime.frame_sums import Curvature
 from motionstyle.spacetime.kernels import scatter
 from motionstyle.spacetime.splines import SplineBasis
 from motionstyle.spacetime.style import Style
@@ -205,8 +206,11 @@ class Evaluator:
         self.force_places = _places(*slopes.pattern(4), 3 * POINTS)
         self.point_places = _places(*problem.functions["foot_points"].pattern(1), COUNT)
         curvature = problem.functions["curvature"]
-        rows, columns = curvature.pattern(0)
-        self.curvature_places = _places(rows, columns, wide), _places(columns, rows, wide)
+        self.curvature_pattern = curvature.pattern(0)
+        rows, columns = self.curvature_pattern
+        # Over q alone: the first numbers, as the pattern is an upper triangle's, by columns.
+        rows, columns = rows[columns < COUNT], columns[columns < COUNT]
+        self.place_places = _places(rows, columns, COUNT), _places(columns, rows, COUNT)
         self.cross_places = _places(*curvature.pattern(1), COUNT)
         rows, columns = problem.functions["foot_curvature"].pattern(0)
         self.bend_places = _places(rows, columns, COUNT), _places(columns, rows, COUNT)
@@ -314,8 +318,8 @@ class Evaluator:
 
     def curvature(
         self, values: Values, slopes: Slopes, lift: Array, foot_lift: Array, pushes: Array
-    ) -> tuple[Array, Array]:
-        """Return Σ multiplier × second derivative: over u (F, 105, 105), and u × λ (F, 105, 32).
+    ) -> tuple[Curvature, Array]:
+        """Return Σ multiplier × second derivative: over u, and q × λ (F, 35, 32).
 
         Parameters
         ----------
@@ -328,9 +332,6 @@ class Evaluator:
         found, crossed = self.problem.functions["curvature"](
             values.coordinates, values.rates, values.accelerations, total, weights, self.parameters
         )
-        hessian = np.zeros((frames, 3 * COUNT, 3 * COUNT))
-        for places in self.curvature_places:
-            scatter(found, places, hessian)
         cross = _filled(crossed, self.cross_places, 3 * POINTS, COUNT)
         pull = (weights[:, None] @ slopes.by_force).reshape(frames, POINTS, 3)
         _force, by_height, by_height2 = self._shoe(values.points)
@@ -340,7 +341,9 @@ class Evaluator:
         bent = self.problem.functions["foot_curvature"](
             values.coordinates, bends.reshape(frames, -1), self.parameters
         )[0]
-        point_part = np.zeros((frames, COUNT, COUNT))
+        place, point_part = np.zeros((2, frames, COUNT, COUNT))
+        for places in self.place_places:
+            scatter(found, places, place)
         for places in self.bend_places:
             scatter(bent, places, point_part)
         if self.problem.style.shoe_stiffness > 0:
@@ -349,13 +352,12 @@ class Evaluator:
             point_part += mixed + np.swapaxes(mixed, 1, 2)
             scaled = (push * by_height2)[..., None] * slopes.heights
             point_part += np.swapaxes(slopes.heights, 1, 2) @ scaled
-        hessian[:, :COUNT, :COUNT] += point_part
+        place += point_part
         _passive, _spring, bend = self.passive(values.coordinates, values.rates)
         joints = np.arange(6, COUNT)
-        hessian[:, joints, joints] += weights[:, 6:] * bend
-        mixed = np.zeros((frames, 3 * COUNT, 4 * POINTS))
-        mixed[:, :COUNT] = (np.swapaxes(cross, 1, 2) @ self.forces_of) * self.bearing[:, None]
-        return hessian, mixed
+        place[:, joints, joints] += weights[:, 6:] * bend
+        mixed = (np.swapaxes(cross, 1, 2) @ self.forces_of) * self.bearing[:, None]
+        return Curvature(found, self.curvature_pattern, place), mixed
 
 
 @dataclass(frozen=True)
