@@ -221,6 +221,7 @@ def test_all_any_and_comparison_with_another_metric(judge):
         ("last", ["3", "1", "2"], 2),
         ("mean", ["3", "1", "5"], 3),
         ("median", ["3", "1", "8"], 3),
+        ("median_ratio", ["3", "inf", "1", "inf", "0"], 3),
         ("min", ["3", "1", "2"], 1),
         ("max", ["3", "1", "2"], 3),
         ("range", ["3", "1", "6"], 5),
@@ -292,6 +293,14 @@ def test_one_cell_without_a_number_leaves_the_claim_unmeasured(judge, cell, stat
     assert "1 of 3 cells are no" in result.reason
     assert result.measured_text == ""
     assert judge(changes, t="error_cm\n0\n1\n1\n").verdict == "replicated"
+
+
+@pytest.mark.parametrize("cells", [["0", "nan", "inf"], ["0", '""', "1"], ["1", "inf", "inf"]])
+def test_a_median_of_ratios_must_itself_be_a_number(judge, cells):
+    metric = {**ENTRY["metrics"]["error"], "statistic": "median_ratio"}
+    result = judge({"metrics": {"error": metric}}, t="error_cm\n" + "\n".join(cells) + "\n")
+    assert result.verdict == "not yet measured"
+    assert "finite" in result.reason
 
 
 def test_unreadable_table_is_a_reason(judge):

@@ -175,6 +175,25 @@ def test_styles_are_compared_by_ratio_and_angles_by_difference(tmp_path):
     assert not any("run_over_walk" in one for one in rests)
 
 
+def test_ratios_to_nothing_have_their_place(tmp_path):
+    file = sheet(
+        tmp_path, {"id": "walk"}, {"id": "run", "clip": "r", "action": "run", "against": "walk"}
+    )
+    walk = some_style()
+    bare, alike = walk.vector(), walk.vector()
+    bare[29:31] = 0.0  # the first two joints' springs
+    alike[30] = 0.0
+    styles = {("walk", "ours"): walk.with_vector(bare), ("run", "ours"): walk.with_vector(alike)}
+    table = style_parameter_rows(read_styles(file), styles, {"walk": walk, "run": walk}, "test")
+    ratios = [
+        one["run_over_walk"]
+        for one in table
+        if one["style"] == "run" and one["parameter"] == "k_s1"
+    ]
+    assert ratios[:2] == [np.inf, 1.0]
+    assert ratios[2:] == [1.0] * 27
+
+
 def test_a_springs_kink_and_a_shoes_end_are_read_off_their_curves():
     style = some_style()
     offset, error = (row["value"] for row in spring_checks(style))

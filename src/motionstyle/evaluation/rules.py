@@ -39,6 +39,7 @@ _STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
     "last": lambda x: x[-1],
     "mean": np.mean,
     "median": np.median,
+    "median_ratio": np.median,
     "min": np.min,
     "max": np.max,
     "range": np.ptp,
@@ -113,7 +114,7 @@ def measure(
 
     Where the rows found hold planted and other data, the planted ones are set aside. One cell
     that is no finite number leaves the whole metric unmeasured: failures are left out only where
-    the ledger's filter says so.
+    the ledger's filter says so. Only `median_ratio` takes infinite ones, ratios to nothing.
     """
 
     def missing(reason: str) -> Measurement:
@@ -151,7 +152,8 @@ def _reduce(metric: Metric, cells: Sequence[str], labels: frozenset[str]) -> Mea
     if metric.statistic == "value" and len(cells) != 1:
         return Measurement(None, f"{where}: {len(cells)} rows match where one is meant", labels)
     numbers = np.array([_number(c) for c in cells])
-    bad = ~np.isfinite(numbers)
+    # A median needs only an order, in which ratios to nothing have their place.
+    bad = np.isnan(numbers) if metric.statistic == "median_ratio" else ~np.isfinite(numbers)
     if metric.statistic == "share_true":
         bad |= ~np.isin(numbers, (0.0, 1.0))
     if bad.any():
@@ -159,10 +161,12 @@ def _reduce(metric: Metric, cells: Sequence[str], labels: frozenset[str]) -> Mea
         kind = "truth values" if metric.statistic == "share_true" else "finite numbers"
         reason = f"{where}: {bad.sum()} of {len(cells)} cells are no {kind} (first: {example})"
         return Measurement(None, reason, labels)
-    if metric.statistic == "value":
-        return Measurement(float(numbers[0]), "", labels)
-    reduce = _STATISTICS.get(metric.statistic, np.mean)  # the mean of truth values is their share
-    return Measurement(float(reduce(numbers)), "", labels)
+    # The mean of truth values is their share, of one value the value.
+    reduce = _STATISTICS.get(metric.statistic, np.mean)
+    found = float(reduce(numbers))
+    if not np.isfinite(found):
+        return Measurement(None, f"{where}: the {metric.statistic} is infinite", labels)
+    return Measurement(found, "", labels)
 
 
 @dataclass(frozen=True)

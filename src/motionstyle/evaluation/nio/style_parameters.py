@@ -1,7 +1,8 @@
 """`tables/style_parameters.csv`: every θ of every learnt style, beside others it is compared with.
 
-Ratios are of the learnt values, run over walk and so on; those of rest angles would mean nothing
-and are differences in degrees (columns `…_minus_…`).
+Ratios are of the learnt values, run over walk and so on: infinite where only the other has none of
+it, 1 where neither has. Those of rest angles would mean nothing and are differences in degrees
+(columns `…_minus_…`).
 """
 
 from __future__ import annotations
@@ -78,10 +79,16 @@ def style_parameter_rows(
                 if column is not None and cells["parameter"] == "q_bar":
                     difference = column.replace("over", "minus") + "_deg"
                     one[difference] = float(np.degrees(values[k] - others[k]))
-                elif column is not None and others[k] > 0:
-                    one[column] = values[k] / others[k]
+                elif column is not None:
+                    one[column] = _ratio(values[k], others[k])
             found.append(one)
     return found
+
+
+def _ratio(own: float, other: float) -> float:
+    if other > 0:
+        return own / other
+    return 1.0 if own == other else np.inf
 
 
 def parameter_cells() -> list[dict[str, str]]:
