@@ -29,6 +29,9 @@ from motionstyle.spacetime.starts import perturbed
 from motionstyle.spacetime.style import Style
 
 Array = NDArray[np.float64]
+# Some of the worst starts, ablated styles above all, are still on their way after 500 iterations
+# and converge soon after; where a style ends is not to depend on where a solve was cut off.
+JUDGING = SolverSettings(iterations=2000)
 LOOSE_HZ = 4.0  # joint movement above it counts as looseness (E3)
 
 
@@ -44,7 +47,7 @@ def judge(
     learning: LearningProblem,
     style: Style,
     starts: Sequence[str],
-    settings: SolverSettings | None = None,
+    settings: SolverSettings = JUDGING,
     *,
     keep_ends: int = 0,
     root_weight: float | None = None,
