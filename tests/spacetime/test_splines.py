@@ -82,3 +82,15 @@ def test_bordered_variables_are_those_of_the_dense_system_and_keep_their_bounds(
     step, more = system.solve_bordered(band, gradient, damping, Border(cross, own, pull, none))
     assert (more == 0).all()
     np.testing.assert_allclose(step, system.solve(band, gradient, damping), atol=1e-8)
+
+
+@pytest.mark.parametrize("frames", [13, 14])
+def test_the_first_and_last_poses_are_decided_by_the_control_points_at_the_ends(frames):
+    basis = SplineBasis.uniform(frames, 30.0, 2.0)
+    controls = np.random.default_rng(8).standard_normal((basis.controls, 2))
+    kept, moved = basis.end_controls, controls + 1.0
+    moved[:kept], moved[-kept:] = controls[:kept], controls[-kept:]
+    before, after = basis.evaluate(controls)[0], basis.evaluate(moved)[0]
+    np.testing.assert_allclose(after[[0, -1]], before[[0, -1]], atol=1e-12)
+    moved[-kept] += 1.0  # one fewer would not do
+    assert np.abs(basis.evaluate(moved)[0][-1] - before[-1]).max() > 1e-3

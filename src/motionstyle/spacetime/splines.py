@@ -49,6 +49,11 @@ class SplineBasis:
         )
         return SplineBasis(first, weights, spans + 3)
 
+    @property
+    def end_controls(self) -> int:
+        """Number of control points at each end that decide the first and last poses."""
+        return 3 if np.isclose(self.weights[-1, 0, 0], 0.0) else 4  # the last frame on a knot
+
     def evaluate(self, controls: Array) -> tuple[Array, Array, Array]:
         """Return q, q̇, q̈, each (F, n), of control points (K, n)."""
         local = controls[self.first[:, None] + np.arange(4)]

@@ -12,8 +12,6 @@ from motionstyle.nio.judging import Judged, ablated_styles, judge
 from motionstyle.nio.learning_problem import LearningProblem
 from motionstyle.spacetime.style import Style
 
-KEPT_ENDS = 3  # control points: half of a cubic spline's reach, 0.2 s
-
 
 @dataclass(frozen=True)
 class Kind:
@@ -82,7 +80,7 @@ def judge_kind(
     if kind.perturbed:
         starts += ["gentle", *(f"perturbed_{seed}" for seed in perturbed)]
     style = judged_style(name, learning, learnt)
-    keep = KEPT_ENDS if kind.ends == "fixed" else 0
+    keep = learning.problem(style).basis().end_controls if kind.ends == "fixed" else 0
     judged = judge(learning, style, starts, keep_ends=keep)
     rows = [_renamed(kind, row) for row in judged.rows]
     provenance = {
