@@ -254,7 +254,7 @@ if STYLES:
         resources:
             mem_mb=1000,
         params:
-            library=library("body", "motion", "figures"),
+            library=library("body", "motion", "figures", "evaluation/nio/kinds.py"),
             style=FIRST_STYLE.id,
             kinds=[kind for _, kind in FIRST_JUDGED],
         script:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from motionstyle.errors import MotionStyleError
+from motionstyle.evaluation.nio.kinds import KINDS
 from motionstyle.figures.strips import strip_figure
 from motionstyle.figures.style import blank_figure, save
 from motionstyle.files import read_json
@@ -23,7 +24,8 @@ with job(snakemake.log[0]):
             titles.append(f"{snakemake.params.style}: captured, made feasible")
         row = read_json(Path(rows))["rows"][0]
         motions.append(motion)
-        titles.append(f"{kind.replace('_', ' ')}: {row['joint_rms_deg']:.1f}° ({row['status']})")
+        title = KINDS[kind].title or kind.replace("_", " ")
+        titles.append(f"{title}: {row['joint_rms_deg']:.1f}° ({row['status']})")
     if motions:
         figure = strip_figure(motions, titles, view="travel", forces=True, paired=True)
     else:

@@ -65,7 +65,6 @@ void add_products(ptrdiff_t frames, const ptrdiff_t *first, const double *weight
 void add_curvature(ptrdiff_t frames, const ptrdiff_t *first, const double *weights, ptrdiff_t n,
                    const ptrdiff_t *rows, const ptrdiff_t *columns, const double *numbers,
                    const double *place, double *blocks) {
-  static const vec none;
   double matrix[3 * N][3][WIDE] = {{{0}}}, *at[n], *mirrored[n]; /* the same for all frames */
   for (ptrdiff_t k = 0; k < n; ++k) {
     const ptrdiff_t i = rows[k], j = columns[k];
@@ -83,8 +82,7 @@ void add_curvature(ptrdiff_t frames, const ptrdiff_t *first, const double *weigh
           for (int d = 0; d < 3; ++d) {
             const vec *row = (const vec *)matrix[d * N + b];
             const double left = w[4 * d + c];
-            const vec w0 = none + left * w[c + e], w1 = none + left * w[4 + c + e],
-                      w2 = none + left * w[8 + c + e];
+            const double w0 = left * w[c + e], w1 = left * w[4 + c + e], w2 = left * w[8 + c + e];
             for (int j = 0; j < VECTORS; ++j)
               to[j] += w0 * row[j] + w1 * row[VECTORS + j] + w2 * row[2 * VECTORS + j];
           }

@@ -63,7 +63,7 @@ def newton_blocks(
     at, by_state = evaluator.limited, slopes.by_state
     by_force = FORCE_UNIT * slopes.by_coefficients
     pushes = -point.row_dual[:, 2 * n :] * evaluator.row_scale[2 * n :]
-    bend, mixed = evaluator.curvature(
+    curvature, mixed = evaluator.curvature(
         values, slopes, point.multiplier, point.foot_multiplier, pushes
     )
     gauss, curved = system.sums.nothing(), system.sums.nothing()
@@ -74,14 +74,14 @@ def newton_blocks(
     stiff = np.where(system.active, point.row_dual / firm, 0.0)
     stiff_scaled = stiff * evaluator.row_scale**2
     up = slopes.heights * stiff_scaled[:, 2 * n :, None]
-    place = bend.place
+    place = curvature.place  # rows and tracking depend on q alone
     place += np.swapaxes(slopes.heights, 1, 2) @ up
     place[:, at, at] += stiff_scaled[:, :n] + stiff_scaled[:, n : 2 * n]
     tracking = evaluator.problem.tracking
     if tracking is not None:
         joints = np.arange(COUNT)
         place[:, joints, joints] += tracking.weights
-    system.sums.add_curvature(bend, curved)
+    system.sums.add_curvature(curvature, curved)
     safe = np.where(system.bearing, point.coefficients, 1.0)
     pull = np.where(system.bearing, system.force_weight * point.coefficients - barrier / safe, 0.0)
     return Blocks(

@@ -18,7 +18,8 @@ class Kind:
     """One way to be judged.
 
     algorithm, variant, ends : as in `tables/resynthesis.csv`. style : recipe of the learnt style
-    it needs, or empty. perturbed : whether starts other than X_T count.
+    it needs, or empty. perturbed : whether starts other than X_T count. title : for figures,
+    where the kind's name is hard to read.
     """
 
     algorithm: str
@@ -26,6 +27,7 @@ class Kind:
     ends: str = "free"
     style: str = ""
     perturbed: bool = False
+    title: str = ""
 
 
 KINDS = {
@@ -34,8 +36,8 @@ KINDS = {
     "ours_fixed": Kind("ours", "full", ends="fixed", style="ours"),
     "paper_fixed": Kind("paper", "full", ends="fixed", style="paper"),
     "initial": Kind("initial", "full"),
-    "no_style_alpha_1": Kind("none", "no_style_alpha_1"),
-    "no_style_alpha_1_29": Kind("none", "no_style_alpha_1_29"),
+    "no_style_alpha_1": Kind("none", "no_style_alpha_1", title="no style, α = 1"),
+    "no_style_alpha_1_29": Kind("none", "no_style_alpha_1_29", title="no style, α = 1/29"),
     "alpha_only": Kind("ours", "alpha_only", style="alpha_only"),
     "springs_left_out": Kind("ours", "springs_left_out", style="ours"),
     "least_squares": Kind("least_squares", "full", style="least_squares"),
