@@ -91,7 +91,8 @@ def curvature_of(hessians):
     numbers = hessians[:, *pattern]
     numbers[:, (pattern[0] < SIZE) & (pattern[1] < SIZE)] = np.nan
     place = hessians[:, :SIZE, :SIZE]
-    return Curvature(np.ascontiguousarray(numbers), pattern, np.ascontiguousarray(place))
+    none = np.zeros((len(hessians), SIZE))
+    return Curvature(np.ascontiguousarray(numbers), pattern, np.ascontiguousarray(place), none)
 
 
 def test_curvatures_are_the_dense_ones_and_add_up(sums, design):
@@ -103,6 +104,14 @@ def test_curvatures_are_the_dense_ones_and_add_up(sums, design):
     sums.add_curvature(curvature_of(hessians), blocks)
     sums.add_curvature(curvature_of(hessians), blocks)
     expected = 2 * np.einsum("fuk,fuv,fvl->kl", design, hessians, design, optimize=True)
+    np.testing.assert_allclose(dense_of(blocks), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_diagonals_are_those_of_the_dense_ones(sums, design):
+    values = np.random.default_rng(8).standard_normal((FRAMES, SIZE))
+    blocks, joints = sums.nothing(), np.arange(SIZE)
+    blocks[:, :, joints, joints] += sums.diagonals(values)
+    expected = np.einsum("fuk,fu,ful->kl", design[:, :SIZE], values, design[:, :SIZE])
     np.testing.assert_allclose(dense_of(blocks), expected, atol=1e-12 * np.abs(expected).max())
 
 

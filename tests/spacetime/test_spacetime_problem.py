@@ -105,6 +105,26 @@ def test_gradient_and_hessian_are_those_of_finite_differences(rough):
             np.testing.assert_allclose(found, numeric, atol=1e-5 * np.abs(numeric).max())
 
 
+def test_concave_bends_are_the_springs_share_of_second_derivatives_below_zero(rough):
+    evaluator, controls, coefficients, rng = rough
+    values = evaluator.values(controls, coefficients)
+    y = rng.standard_normal((FRAMES, 35))
+    nothing = np.zeros((FRAMES, 24)), np.zeros((FRAMES, 8))
+    found, _mixed = evaluator.curvature(values, evaluator.slopes(values), y, *nothing)
+    passive, h = evaluator.problem.style.passive, 1e-5
+
+    def springs(step):
+        return passive_forces(passive, values.coordinates[:, 6:] + step, values.rates[:, 6:])
+
+    # Q_m = τ − Q_p, scaled by the root of α.
+    bends = -(springs(h) - 2 * springs(0.0) + springs(-h)) / h**2
+    bends *= np.sqrt(evaluator.problem.style.preferences) * y[:, 6:]
+    assert (bends < 0).mean() > 0.3 and (bends > 0).mean() > 0.3
+    expected = np.minimum(bends, 0.0)
+    np.testing.assert_allclose(found.concave[:, 6:], expected, atol=1e-4 * np.abs(bends).max())
+    np.testing.assert_array_equal(found.concave[:, :6], 0.0)
+
+
 def test_inequality_rows_are_distances_to_the_ranges_and_clearances(rough):
     evaluator, controls, coefficients, _rng = rough
     values = evaluator.values(controls, coefficients)

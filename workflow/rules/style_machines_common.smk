@@ -95,11 +95,10 @@ SHMM_STRIPS = {
         "side",
         None,
     ),
-    "shmm_choreography": (
-        [f"dance-move{m}-{k}" for m in range(4) for k in range(5)],
-        "oblique",
-        7,
-    ),
+    **{
+        f"shmm_move_{m + 1}": ([f"dance-move{m}-{k}" for k in range(5)], "oblique", 7)
+        for m in range(4)
+    },
     "shmm_walks": ([*(f"dance-walk-{k}" for k in range(3)), "dance-pasted"], "oblique", 9),
     "shmm_novice_strip": (
         [f"dance-novice-{k}" for k in ("original", "novice", "improved")],

@@ -45,12 +45,14 @@ class Curvature:
     """Symmetric second derivatives over u = (q, q̇, q̈), as the few numbers that are not 0.
 
     numbers : (F, n), at `pattern`, rows and columns (n,), of one triangle of (105, 105). Those
-    over q alone do not count: they are in `place`, whole, (F, 35, 35).
+    over q alone do not count: they are in `place`, whole, (F, 35, 35). concave : what springs add
+    to the diagonal of `place` where it is below 0, else 0, (F, 35).
     """
 
     numbers: Array
     pattern: tuple[Whole, Whole]
     place: Array
+    concave: Array
 
     def dense(self) -> Array:
         """Return them as matrices (F, 105, 105)."""
@@ -111,6 +113,16 @@ class FrameSums:
             w, split = self.weights[t], hessian.reshape(3, SIZE, 3, SIZE)
             local = np.einsum("dc,danb,nk->ckab", w, split, w, optimize=True)
             self._add_local(t, local, blocks)
+
+    def diagonals(self, values: Array) -> Array:
+        """Return the diagonals (K, 4, 35) of the blocks Σ_t Φᵀ diag(d) Φ of d (F, 35) over q."""
+        found = np.zeros((self.basis.controls, 4, SIZE))
+        own = self.weights[:, 0]
+        for c in range(4):
+            for e in range(4 - c):
+                products = (own[:, c] * own[:, c + e])[:, None] * values
+                np.add.at(found[:, e], self.first + c, products)
+        return found
 
     def banded(self, blocks: Array, shift: Array, added: Array) -> Array:
         """Return a matrix's blocks as a lower band (140, K·35), see `banded`.

@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 
 MOST_NONLINEAR = 10.0  # a step that errs by more than ten times its gain is not taken
 LEAST_DELTA, FIRST_DELTA = 1e-4, 1e-2  # below the first δ counts as 0
-UP, DOWN = 4.0, 6.0  # of δ after a step that was not taken, and between good steps
+UP, DOWN = 4.0, 10.0  # of δ after a step that was not taken, and between good steps
 STIFFEST = 1e8  # the δ at which a search is given up
 PACE_OVER, PACE_BELOW = 10, 1e3  # iterations over which E's fall is judged; not if far off
 
@@ -166,7 +166,7 @@ class InteriorPoint:
         """Return the step that is taken, or None, and its δ, raised until a step is accepted."""
         first = True
         while True:
-            factor = factorise(self.system, blocks, wanted, last)
+            factor = factorise(self.system, blocks, wanted, last, straighten=True)
             step, slope = newton_step(self.system, here.point, blocks, factor, here.excess)
             found = self._search(here, blocks, factor, step, slope, filter_)
             if found is None and first:

@@ -2,6 +2,11 @@
 
 Three moves: `newton_blocks` gathers what does not depend on the regularisation δ, `factorise`
 eliminates λ and finds the least δ that makes the matrix convex, `newton_step` solves.
+
+A spring about to reach its rest angle bends within milliradians (7), and its curvature, where it is
+negative, is the most negative of all by orders of magnitude, in one joint during some frames. A δ
+large enough for it would hold back all joints during all frames, so this curvature is left out
+before δ is raised.
 """
 
 from __future__ import annotations
@@ -18,6 +23,7 @@ from motionstyle.spacetime.solver_point import FORCE_UNIT, Excess, Point
 from motionstyle.spacetime.spacetime_problem import COUNT, Slopes, Values
 
 Array = NDArray[np.float64]
+EXACT_BELOW = 1e-2  # the δ from which concave springs are left out at once
 RIGID = 1e20  # what holds fixed control points: far above the largest curvature, some 1e11
 
 
@@ -28,6 +34,7 @@ class Blocks:
     Attributes
     ----------
     curved, gauss : over the control points, in blocks (K, 4, 36, 40), see `frame_sums`.
+    concave : the share of `curved` that is concave bends of springs, on diagonals, (K, 4, 35).
     forces : λ's own block and that of λ and u, the barrier and w_λ in its diagonal.
     track_pull : ∂φ/∂q of the tracking term, (F, 35).
     force_pull : ∂φ/∂λ without residuals, (F, 32). by_force : ∂r/∂λ, (F, 35, 32), per 100 N.
@@ -37,6 +44,7 @@ class Blocks:
     barrier: float
     curved: Array
     gauss: Array
+    concave: Array
     forces: ForceBlocks
     track_pull: Array
     force_pull: Array
@@ -88,6 +96,7 @@ def newton_blocks(
         barrier=barrier,
         curved=curved,
         gauss=gauss,
+        concave=system.sums.diagonals(curvature.concave),
         forces=ForceBlocks(
             inner=np.swapaxes(by_force, 1, 2) @ by_force,
             diagonal=np.where(system.bearing, point.dual / safe + system.force_weight, 1.0),
@@ -102,12 +111,20 @@ def newton_blocks(
     )
 
 
-def factorise(system: BarrierProblem, blocks: Blocks, wanted: float, last: float = 0.0) -> Factor:
+def factorise(
+    system: BarrierProblem,
+    blocks: Blocks,
+    wanted: float,
+    last: float = 0.0,
+    *,
+    straighten: bool = False,
+) -> Factor:
     """Return the factored Newton matrix, with the δ that is wanted or as much as makes it convex.
 
     Parameters
     ----------
     last : the last δ that was not 0, or 0.
+    straighten : whether concave bends of springs may be left out of it before δ is raised.
 
     Raises
     ------
@@ -116,7 +133,11 @@ def factorise(system: BarrierProblem, blocks: Blocks, wanted: float, last: float
     """
     delta = wanted
     while True:
-        found = _eliminate(system, blocks, delta)
+        found = None
+        if not straighten or delta < EXACT_BELOW:
+            found = _eliminate(system, blocks, delta)
+        if found is None and straighten:
+            found = _eliminate(system, blocks, delta, straightened=True)
         if found is not None:
             return found
         delta = 4 * delta if delta else max(1e-4, last / 3)
@@ -124,7 +145,9 @@ def factorise(system: BarrierProblem, blocks: Blocks, wanted: float, last: float
             raise FloatingPointError("the Newton matrix has entries that are not finite")
 
 
-def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor | None:
+def _eliminate(
+    system: BarrierProblem, blocks: Blocks, delta: float, *, straightened: bool = False
+) -> Factor | None:
     """Return the factored matrix with λ eliminated; None if it is not convex at δ.
 
     δ is added on all unknowns: on the copies of residuals it means (1 + δ) JᵀJ, a metric in
@@ -132,6 +155,9 @@ def _eliminate(system: BarrierProblem, blocks: Blocks, delta: float) -> Factor |
     """
     total = (1 + delta) * blocks.gauss
     total += blocks.curved
+    if straightened:
+        joints = np.arange(COUNT)
+        total[:, :, joints, joints] -= blocks.concave
     eliminated = system.sums.eliminate(total, delta, blocks.forces)
     fixed = np.where(system.fixed, RIGID, 0.0).ravel()
     found = factor(system.sums.banded(total, delta * system.metric, fixed + delta))

@@ -321,6 +321,8 @@ class Evaluator:
     ) -> tuple[Curvature, Array]:
         """Return Σ multiplier × second derivative: over u, and q × λ (F, 35, 32).
 
+        The first knows which part of it is concave bends of springs, see `Curvature`.
+
         Parameters
         ----------
         lift, foot_lift : multipliers of the residuals (F, 35) and foot residuals (F, 24).
@@ -355,9 +357,12 @@ class Evaluator:
         place += point_part
         _passive, _spring, bend = self.passive(values.coordinates, values.rates)
         joints = np.arange(6, COUNT)
-        place[:, joints, joints] += weights[:, 6:] * bend
+        bends_of_springs = weights[:, 6:] * bend
+        place[:, joints, joints] += bends_of_springs
+        concave = np.zeros((frames, COUNT))
+        concave[:, 6:] = np.minimum(bends_of_springs, 0.0)
         mixed = (np.swapaxes(cross, 1, 2) @ self.forces_of) * self.bearing[:, None]
-        return Curvature(found, self.curvature_pattern, place), mixed
+        return Curvature(found, self.curvature_pattern, place, concave), mixed
 
 
 @dataclass(frozen=True)
