@@ -7,8 +7,10 @@ import pytest
 
 from motionstyle.body.kinematics import centre_of_mass, forward_kinematics
 from motionstyle.dynamics.inverse import GRAVITY
+from motionstyle.dynamics.passive import PassiveParameters
 from motionstyle.spacetime.interior_point import FORCE_UNIT, InteriorPoint, SolverSettings
 from motionstyle.spacetime.spacetime_problem import Evaluator
+from motionstyle.spacetime.style import Style
 from spacetime_problems import bent, flight_problem, plain_style, standing_problem, throw
 
 FRAMES = 10
@@ -134,3 +136,18 @@ def test_a_start_that_is_not_a_number_is_told_as_the_status(stand, part):
     assert result.status == "not a number"
     if part == "controls":
         assert solver.solve(solver.start(spoilt)).status == "not a number"
+
+
+@pytest.mark.parametrize("seed", [2, 11])
+def test_steps_of_the_filter_and_of_restoration_do_not_go_round_in_circles(
+    all_functions, plain_body, standing, seed
+):
+    """Springs that switch within 2 mrad of where the body stands: 124 and over 150 iterations."""
+    rng = np.random.default_rng(seed)
+    q = bent(standing, FRAMES)
+    rest = q[0, 6:] + 0.02 * rng.standard_normal(29)
+    above, below, damping = (rng.uniform(*r, 29) for r in ((5, 400), (5, 400), (0.5, 5)))
+    style = Style(np.full(29, 1 / 29), PassiveParameters(above, below, damping, rest))
+    evaluator = Evaluator(standing_problem(all_functions, plain_body, q, style, gain=500.0))
+    solver = InteriorPoint(evaluator, SolverSettings(iterations=80))
+    assert solver.solve(solver.start(evaluator.basis.fit(q))).status == "converged"

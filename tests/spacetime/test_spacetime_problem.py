@@ -119,7 +119,8 @@ def test_concave_bends_are_the_springs_share_of_second_derivatives_below_zero(ro
     # Q_m = τ − Q_p, scaled by the root of α.
     bends = -(springs(h) - 2 * springs(0.0) + springs(-h)) / h**2
     bends *= np.sqrt(evaluator.problem.style.preferences) * y[:, 6:]
-    assert (bends < 0).mean() > 0.3 and (bends > 0).mean() > 0.3
+    assert (bends < 0).mean() > 0.3
+    assert (bends > 0).mean() > 0.3
     expected = np.minimum(bends, 0.0)
     np.testing.assert_allclose(found.concave[:, 6:], expected, atol=1e-4 * np.abs(bends).max())
     np.testing.assert_array_equal(found.concave[:, :6], 0.0)

@@ -82,6 +82,7 @@ class InteriorPoint:
         self.evaluator = evaluator
         self.settings = settings
         self.system = BarrierProblem(evaluator)
+        self.least_restored = np.inf  # error after a restoration at the present μ
 
     def start(
         self, controls: Array, coefficients: Array | None = None, *, near: bool = False
@@ -108,6 +109,7 @@ class InteriorPoint:
         theta = system.excess(point, values).total()
         limits = (1e4 * max(1.0, theta), 1e-4 * max(1.0, theta))
         filter_: list[tuple[float, float]] = []
+        self.least_restored = np.inf
         length = delta = bent = 0.0
         slopes = None
         while True:
@@ -129,7 +131,7 @@ class InteriorPoint:
                 break
             lower = self._lowered(barrier, errors)
             if lower < barrier:
-                barrier, filter_ = lower, []
+                barrier, filter_, self.least_restored = lower, [], np.inf
                 if self.settings.whole_steps:
                     point = system.settled(point, values, barrier)
                     errors = system.errors(point, values, slopes)
@@ -278,7 +280,9 @@ class InteriorPoint:
         """Return the whole step if it lowers the barrier problem's error, or None.
 
         The soft restoration of Wächter & Biegler §3.3: near an optimum φ and θ change by less
-        than rounding, but the error of the optimality conditions still tells steps apart.
+        than rounding, but the error of the optimality conditions still tells steps apart. Each time
+        at the same μ it has to be lower than the last time: since the filter is emptied, steps that
+        the filter takes and steps taken here would else go round in circles.
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
             moved, found, length = self._moved(here, step)
@@ -286,8 +290,10 @@ class InteriorPoint:
             return None
         slopes = self.evaluator.slopes(found)
         after = self.system.errors(moved, found, slopes).at(here.barrier)
-        fell = after <= 0.9 * here.errors.at(here.barrier)
-        return _Trial(moved, found, length, slopes=slopes) if fell else None
+        if not after <= 0.9 * min(here.errors.at(here.barrier), self.least_restored):
+            return None
+        self.least_restored = after
+        return _Trial(moved, found, length, slopes=slopes)
 
     def _moved(self, here: _Here, step: Point) -> tuple[Point, Values, float]:
         """Return the point a step away, its values, and the step's length."""
