@@ -138,16 +138,20 @@ def test_a_start_that_is_not_a_number_is_told_as_the_status(stand, part):
         assert solver.solve(solver.start(spoilt)).status == "not a number"
 
 
-@pytest.mark.parametrize("seed", [2, 11])
-def test_steps_of_the_filter_and_of_restoration_do_not_go_round_in_circles(
+@pytest.mark.parametrize("seed", [2, 11, 35])
+def test_steps_do_not_go_round_in_circles_where_springs_switch(
     all_functions, plain_body, standing, seed
 ):
-    """Springs that switch within 2 mrad of where the body stands: 124 and over 150 iterations."""
+    """Springs that switch near where the body stands.
+
+    Filter and restoration undid one another's steps in the first two (124 and over 150 iterations),
+    steps without concave springs hopped to and fro in the third (88).
+    """
     rng = np.random.default_rng(seed)
     q = bent(standing, FRAMES)
     rest = q[0, 6:] + 0.02 * rng.standard_normal(29)
     above, below, damping = (rng.uniform(*r, 29) for r in ((5, 400), (5, 400), (0.5, 5)))
     style = Style(np.full(29, 1 / 29), PassiveParameters(above, below, damping, rest))
     evaluator = Evaluator(standing_problem(all_functions, plain_body, q, style, gain=500.0))
-    solver = InteriorPoint(evaluator, SolverSettings(iterations=80))
+    solver = InteriorPoint(evaluator, SolverSettings(iterations=70))
     assert solver.solve(solver.start(evaluator.basis.fit(q))).status == "converged"

@@ -45,6 +45,7 @@ MOST_NONLINEAR = 10.0  # a step that errs by more than ten times its gain is not
 LEAST_DELTA, FIRST_DELTA = 1e-4, 1e-2  # below the first δ counts as 0
 UP, DOWN = 4.0, 10.0  # of δ after a step that was not taken, and between good steps
 STIFFEST = 1e8  # the δ at which a search is given up
+PATIENCE, GAIN = 20, 1e-6  # iterations at one μ that must lower the error, or φ by this share
 PACE_OVER, PACE_BELOW = 10, 1e3  # iterations over which E's fall is judged; not if far off
 
 
@@ -75,6 +76,28 @@ class _Here:
     limits: tuple[float, float]
 
 
+class _Progress:
+    """What was reached at one μ, and whether steps still lead anywhere.
+
+    Steps of a matrix whose concave springs are left out may hop to and fro over the bend of one.
+
+    restored : error after the last restoration.
+    """
+
+    def __init__(self) -> None:
+        self.error = self.phi = self.restored = np.inf
+        self.since, self.stalled = 0, False
+
+    def note(self, error: float, phi: float) -> None:
+        """Take down the error and φ of an iteration."""
+        self.since += 1
+        if error < 0.9 * self.error:
+            self.error, self.since = error, 0
+        if phi < self.phi - GAIN * abs(phi):
+            self.phi, self.since = phi, 0
+        self.stalled |= self.since > PATIENCE
+
+
 class InteriorPoint:
     """Solves one problem by steps along which a filter searches."""
 
@@ -82,7 +105,7 @@ class InteriorPoint:
         self.evaluator = evaluator
         self.settings = settings
         self.system = BarrierProblem(evaluator)
-        self.least_restored = np.inf  # error after a restoration at the present μ
+        self.progress = _Progress()
 
     def start(
         self, controls: Array, coefficients: Array | None = None, *, near: bool = False
@@ -109,9 +132,8 @@ class InteriorPoint:
         theta = system.excess(point, values).total()
         limits = (1e4 * max(1.0, theta), 1e-4 * max(1.0, theta))
         filter_: list[tuple[float, float]] = []
-        self.least_restored = np.inf
-        length = delta = bent = 0.0
-        slopes = None
+        self.progress = _Progress()
+        length, delta, bent, slopes = 0.0, 0.0, 0.0, None
         while True:
             slopes = slopes or self.evaluator.slopes(values)
             errors = system.errors(point, values, slopes)
@@ -131,11 +153,12 @@ class InteriorPoint:
                 break
             lower = self._lowered(barrier, errors)
             if lower < barrier:
-                barrier, filter_, self.least_restored = lower, [], np.inf
+                barrier, filter_, self.progress = lower, [], _Progress()
                 if self.settings.whole_steps:
                     point = system.settled(point, values, barrier)
                     errors = system.errors(point, values, slopes)
                 excess, phi = system.excess(point, values), system.objective(point, barrier)
+            self.progress.note(errors.at(barrier), phi)
             here = _Here(point, errors, excess, phi, excess.total(), barrier, limits)
             blocks = newton_blocks(system, point, values, slopes, barrier)
             try:
@@ -168,7 +191,8 @@ class InteriorPoint:
         """Return the step that is taken, or None, and its δ, raised until a step is accepted."""
         first = True
         while True:
-            factor = factorise(self.system, blocks, wanted, last, straighten=True)
+            straighten = not self.progress.stalled
+            factor = factorise(self.system, blocks, wanted, last, straighten=straighten)
             step, slope = newton_step(self.system, here.point, blocks, factor, here.excess)
             found = self._search(here, blocks, factor, step, slope, filter_)
             if found is None and first:
@@ -290,9 +314,9 @@ class InteriorPoint:
             return None
         slopes = self.evaluator.slopes(found)
         after = self.system.errors(moved, found, slopes).at(here.barrier)
-        if not after <= 0.9 * min(here.errors.at(here.barrier), self.least_restored):
+        if not after <= 0.9 * min(here.errors.at(here.barrier), self.progress.restored):
             return None
-        self.least_restored = after
+        self.progress.restored = after
         return _Trial(moved, found, length, slopes=slopes)
 
     def _moved(self, here: _Here, step: Point) -> tuple[Point, Values, float]:
