@@ -89,8 +89,7 @@ def test_learning_brings_the_optimum_nearer_to_the_motion(made_learning, rows, s
     before = inner_solve(made_learning, made_learning.start, own)
     before_deg = made_learning.joint_error_deg(before.cost.values.coordinates)
     assert rows[-1]["closeness"] == 0
-    # Two stages and one round are little: 9.4 of 11.5° (10.6 of 14.0 before the solver got better).
-    assert min(row["joint_error_deg"] for row in rows if not row["closeness"]) < 0.85 * before_deg
+    assert min(row["joint_error_deg"] for row in rows if not row["closeness"]) < 0.8 * before_deg
 
 
 def test_where_the_motion_jumps_a_stage_is_put_between(made_learning, settings, monkeypatch):

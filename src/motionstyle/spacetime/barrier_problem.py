@@ -146,8 +146,6 @@ class Errors:
 
 def _metric(basis: SplineBasis) -> Array:
     found = np.zeros((basis.controls, 4))
-    for c in range(4):
-        for e in range(4 - c):
-            products = basis.weights[:, :, c] * basis.weights[:, :, c + e]
-            np.add.at(found[:, e], basis.first + c, products @ METRIC)
+    for c, e, products in basis.pairs():
+        np.add.at(found[:, e], basis.first + c, products @ METRIC)
     return found

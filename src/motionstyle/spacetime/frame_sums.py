@@ -117,11 +117,8 @@ class FrameSums:
     def diagonals(self, values: Array) -> Array:
         """Return the diagonals (K, 4, 35) of the blocks Σ_t Φᵀ diag(d) Φ of d (F, 35) over q."""
         found = np.zeros((self.basis.controls, 4, SIZE))
-        own = self.weights[:, 0]
-        for c in range(4):
-            for e in range(4 - c):
-                products = (own[:, c] * own[:, c + e])[:, None] * values
-                np.add.at(found[:, e], self.first + c, products)
+        for c, e, products in self.basis.pairs():
+            np.add.at(found[:, e], self.first + c, products[:, :1] * values)
         return found
 
     def banded(self, blocks: Array, shift: Array, added: Array) -> Array:

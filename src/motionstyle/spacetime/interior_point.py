@@ -37,6 +37,7 @@ from motionstyle.spacetime.solver_point import (
 )
 from motionstyle.spacetime.spacetime_problem import Evaluator, Slopes, Values
 from motionstyle.spacetime.starting_point import starting_point
+from motionstyle.spacetime.step_filter import StepFilter
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,6 @@ MOST_NONLINEAR = 10.0  # a step that errs by more than ten times its gain is not
 LEAST_DELTA, FIRST_DELTA = 1e-4, 1e-2  # below the first δ counts as 0
 UP, DOWN = 4.0, 10.0  # of δ after a step that was not taken, and between good steps
 STIFFEST = 1e8  # the δ at which a search is given up
-PATIENCE, GAIN = 20, 1e-6  # iterations at one μ that must lower the error, or φ by this share
 PACE_OVER, PACE_BELOW = 10, 1e3  # iterations over which E's fall is judged; not if far off
 
 
@@ -76,28 +76,6 @@ class _Here:
     limits: tuple[float, float]
 
 
-class _Progress:
-    """What was reached at one μ, and whether steps still lead anywhere.
-
-    Steps of a matrix whose concave springs are left out may hop to and fro over the bend of one.
-
-    restored : error after the last restoration.
-    """
-
-    def __init__(self) -> None:
-        self.error = self.phi = self.restored = np.inf
-        self.since, self.stalled = 0, False
-
-    def note(self, error: float, phi: float) -> None:
-        """Take down the error and φ of an iteration."""
-        self.since += 1
-        if error < 0.9 * self.error:
-            self.error, self.since = error, 0
-        if phi < self.phi - GAIN * abs(phi):
-            self.phi, self.since = phi, 0
-        self.stalled |= self.since > PATIENCE
-
-
 class InteriorPoint:
     """Solves one problem by steps along which a filter searches."""
 
@@ -105,7 +83,7 @@ class InteriorPoint:
         self.evaluator = evaluator
         self.settings = settings
         self.system = BarrierProblem(evaluator)
-        self.progress = _Progress()
+        self.filter = StepFilter()  # of the present μ
 
     def start(
         self, controls: Array, coefficients: Array | None = None, *, near: bool = False
@@ -131,8 +109,7 @@ class InteriorPoint:
             point = system.settled(point, values, barrier)
         theta = system.excess(point, values).total()
         limits = (1e4 * max(1.0, theta), 1e-4 * max(1.0, theta))
-        filter_: list[tuple[float, float]] = []
-        self.progress = _Progress()
+        self.filter = StepFilter()
         length, delta, bent, slopes = 0.0, 0.0, 0.0, None
         while True:
             slopes = slopes or self.evaluator.slopes(values)
@@ -153,16 +130,16 @@ class InteriorPoint:
                 break
             lower = self._lowered(barrier, errors)
             if lower < barrier:
-                barrier, filter_, self.progress = lower, [], _Progress()
+                barrier, self.filter = lower, StepFilter()
                 if self.settings.whole_steps:
                     point = system.settled(point, values, barrier)
                     errors = system.errors(point, values, slopes)
                 excess, phi = system.excess(point, values), system.objective(point, barrier)
-            self.progress.note(errors.at(barrier), phi)
+            self.filter.note(errors.at(barrier), phi)
             here = _Here(point, errors, excess, phi, excess.total(), barrier, limits)
             blocks = newton_blocks(system, point, values, slopes, barrier)
             try:
-                accepted, delta = self._stepped(here, blocks, wanted, last, filter_)
+                accepted, delta = self._stepped(here, blocks, wanted, last)
             except FloatingPointError:
                 status = "not a number"
                 break
@@ -171,7 +148,8 @@ class InteriorPoint:
                     status = "no step found"
                     break
                 # Restoration is exact here: the copies take the residuals' own values.
-                point, length, filter_ = self._closed(point, values, barrier), 0.0, []
+                point, length = self._closed(point, values, barrier), 0.0
+                self.filter.entries.clear()
                 continue
             length, values, bent = accepted.length, accepted.values, accepted.nonlinearity
             slopes = accepted.slopes
@@ -181,24 +159,18 @@ class InteriorPoint:
         return InteriorPointResult(status, point, values, error, len(trace) - 1, spent, trace)
 
     def _stepped(
-        self,
-        here: _Here,
-        blocks: Blocks,
-        wanted: float,
-        last: float,
-        filter_: list[tuple[float, float]],
+        self, here: _Here, blocks: Blocks, wanted: float, last: float
     ) -> tuple[_Trial | None, float]:
         """Return the step that is taken, or None, and its δ, raised until a step is accepted."""
         first = True
+        # Steps without concave springs may hop to and fro over the bend of one.
+        straighten = not self.filter.stalled
         while True:
-            straighten = not self.progress.stalled
             factor = factorise(self.system, blocks, wanted, last, straighten=straighten)
             step, slope = newton_step(self.system, here.point, blocks, factor, here.excess)
-            found = self._search(here, blocks, factor, step, slope, filter_)
+            found = self._search(here, blocks, factor, step, slope)
             if found is None and first:
                 found = self._restored(here, step)
-                if found is not None:
-                    filter_.clear()
             if found is not None or factor.delta > STIFFEST:
                 return found, factor.delta
             first, wanted = False, max(UP * factor.delta, 1e-3)
@@ -242,13 +214,7 @@ class InteriorPoint:
         return barrier
 
     def _search(
-        self,
-        here: _Here,
-        blocks: Blocks,
-        factor: Factor,
-        step: Point,
-        slope: float,
-        filter_: list[tuple[float, float]],
+        self, here: _Here, blocks: Blocks, factor: Factor, step: Point, slope: float
     ) -> _Trial | None:
         """Return the step, or the step with corrections, if the filter accepts it, or None."""
         settings, total, this, before = self.settings, here.excess, step, np.inf
@@ -264,11 +230,7 @@ class InteriorPoint:
             more = corrections < settings.corrections
             bent = missed > max(settings.loose * gain, noise) and missed < 0.5 * before
             tame = missed <= max(MOST_NONLINEAR * gain, noise)
-            if (
-                tame
-                and not (more and bent)
-                and self._accepts(here, moved, miss, slope * length, filter_)
-            ):
+            if tame and not (more and bent) and self._accepts(here, moved, miss, slope * length):
                 return _Trial(moved, values, length, missed / gain)
             if more:
                 total = miss.plus(here.excess, length) if corrections == 0 else total.plus(miss)
@@ -276,37 +238,17 @@ class InteriorPoint:
                 this, _slope = newton_step(self.system, here.point, blocks, factor, total)
         return None
 
-    def _accepts(
-        self,
-        here: _Here,
-        moved: Point,
-        miss: Excess,
-        slope: float,
-        filter_: list[tuple[float, float]],
-    ) -> bool:
-        """Say whether a trial point is better in φ or in θ, and remember it in the filter."""
-        theta, phi = here.theta, here.phi
+    def _accepts(self, here: _Here, moved: Point, miss: Excess, slope: float) -> bool:
+        """Say whether the filter takes a trial point."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            new_theta, new_phi = miss.total(), self.system.objective(moved, here.barrier)
-        rounding = 10 * np.finfo(float).eps * abs(phi)
-        if not np.isfinite(new_phi + new_theta) or new_theta > here.limits[0]:
-            return False
-        if any(new_theta >= (1 - 1e-5) * t and new_phi >= p - 1e-5 * t for t, p in filter_):
-            return False
-        if slope < 0 and (-slope) ** 2.3 > theta**1.1 and theta <= here.limits[1]:
-            return new_phi - phi - rounding <= 1e-8 * slope
-        if new_theta <= (1 - 1e-5) * theta or new_phi - rounding <= phi - 1e-5 * theta:
-            filter_.append(((1 - 1e-5) * theta, phi - 1e-5 * theta))
-            return True
-        return False
+            after = miss.total(), self.system.objective(moved, here.barrier)
+        return self.filter.takes((here.theta, here.phi), after, slope, here.limits)
 
     def _restored(self, here: _Here, step: Point) -> _Trial | None:
         """Return the whole step if it lowers the barrier problem's error, or None.
 
         The soft restoration of Wächter & Biegler §3.3: near an optimum φ and θ change by less
-        than rounding, but the error of the optimality conditions still tells steps apart. Each time
-        at the same μ it has to be lower than the last time: since the filter is emptied, steps that
-        the filter takes and steps taken here would else go round in circles.
+        than rounding, but the error of the optimality conditions still tells steps apart.
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a wild trial
             moved, found, length = self._moved(here, step)
@@ -314,9 +256,8 @@ class InteriorPoint:
             return None
         slopes = self.evaluator.slopes(found)
         after = self.system.errors(moved, found, slopes).at(here.barrier)
-        if not after <= 0.9 * min(here.errors.at(here.barrier), self.progress.restored):
+        if not self.filter.takes_restoration(here.errors.at(here.barrier), after):
             return None
-        self.progress.restored = after
         return _Trial(moved, found, length, slopes=slopes)
 
     def _moved(self, here: _Here, step: Point) -> tuple[Point, Values, float]:

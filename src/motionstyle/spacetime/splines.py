@@ -6,7 +6,7 @@ control points, so that sums of squares over frames have banded normal equations
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +53,15 @@ class SplineBasis:
     def end_controls(self) -> int:
         """Number of control points at each end that decide the first and last poses."""
         return 3 if np.isclose(self.weights[-1, 0, 0], 0.0) else 4  # the last frame on a knot
+
+    def pairs(self) -> Iterator[tuple[int, int, Array]]:
+        """Yield c, e and the products (F, 3) of the weights of control points c and c + e.
+
+        c counts from each frame's first; all pairs of the four with e ≥ 0, for q, q̇, q̈.
+        """
+        for c in range(4):
+            for e in range(4 - c):
+                yield c, e, self.weights[:, :, c] * self.weights[:, :, c + e]
 
     def evaluate(self, controls: Array) -> tuple[Array, Array, Array]:
         """Return q, q̇, q̈, each (F, n), of control points (K, n)."""
